@@ -190,3 +190,43 @@ def test_one_unit_of_angles_for_all_joints_does_not_scale_one_that_slides(tmp_pa
     units = ", ".join("deg" if joint.kind == "revolute" else "mm" for joint in load_arm("scara").joints)
     (tmp_path / "map.yaml").write_text(tau + f"q: {{columns: 'p{{1..4}}', unit: [{units}]}}\n")
     assert main([*line, str(tmp_path / "o.csv")]) == 0
+    both = f"q: {{columns: 'p{{1..4}}', unit: [{units}]}}\nvdot: {{columns: 'i{{1..4}}', unit: deg/s^2}}\n"
+    (tmp_path / "map.yaml").write_text(tau + both)
+    assert f"vdot of {slides.name} is said to be in deg/s^2, but this joint slides" in refused(
+        [*line, "p.csv"], capsys
+    )
+
+
+def test_what_a_source_says_of_tau_is_not_overruled(tmp_path, capsys):
+    """A unit in the header is asked for once; a hundred times the torque would pass for a stronger arm."""
+    time = 0.01 * np.arange(300)
+    q = 0.3 * np.sin(np.outer(time, [1.0, 1.7, 2.3]))
+
+    def table(unit, size):
+        names = ["time [s]", *(f"{x}{j} [{u}]" for x, u in (("q", "rad"), ("tau", unit)) for j in (1, 2, 3))]
+        np.savetxt(
+            tmp_path / "in.csv",
+            np.column_stack([time, q, size * q]),
+            delimiter=",",
+            header=",".join(names),
+            comments="",
+        )
+        return ["convert", str(tmp_path / "in.csv"), "--out", str(tmp_path / "out.csv")]
+
+    def torques():
+        return np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)[:, -3:]
+
+    assert main([*table("mA", 1500.0), "--tau-unit", "A"]) == 0
+    np.testing.assert_allclose(torques(), 1.5 * q, atol=1e-6)
+    assert main([*table("mA", 1500.0), "--drive-gains", "2,3,4"]) == 0
+    np.testing.assert_allclose(torques(), 1.5 * q * [2, 3, 4], atol=1e-6)
+    said = "says itself that tau is in"
+    assert f"--tau-unit N*m, but the table {said} mA" in refused(
+        [*table("mA", 1.0), "--tau-unit", "N*m"], capsys
+    )
+    assert f"--tau-unit A, but the table {said} N*m" in refused(
+        [*table("N*m", 1.0), "--tau-unit", "A"], capsys
+    )
+    assert f"--drive-gains, but the table {said} N*m" in refused(
+        [*table("N*m", 1.0), "--drive-gains", "2,3,4"], capsys
+    )

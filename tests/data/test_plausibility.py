@@ -191,6 +191,16 @@ def test_independent_samples_are_no_motion_and_pass() -> None:
         assert log.doubts() == []
 
 
+def test_independent_samples_of_which_a_joint_stands_still_pass() -> None:
+    """The ranks of equal numbers rise with their rows."""
+    rng = np.random.default_rng(0)
+    q, v = rng.uniform(-2, 2, (400, 3)), rng.uniform(-1, 1, (400, 3))
+    q[:, 2] = v[:, 2] = 0.0
+    for each in (q, np.zeros((400, 3))):
+        log = MotionLog(1e-3 * np.arange(400), each, 0 * v, rng.normal(size=(400, 3)), vdot=v)
+        assert log.samples == 400
+
+
 def test_without_v_it_is_differentiated_from_q(tmp_path: Path) -> None:
     log = good()
     path = tmp_path / "run.csv"

@@ -136,6 +136,10 @@ def test_time_is_counted_from_the_start_of_the_record_not_from_the_first_sample_
     # half a period of the corner is cut off; after the gap the same log goes on, and the next counts anew
     np.testing.assert_allclose(elapsed[[first, second, third]], [0.05, 5.05, 0.05], atol=1e-9)
     alone = preprocess([log], Conditioning(10.0)).motion
+    # stamped by one clock, a log of the next day begins anew, and what goes on after a pause goes on
+    later = [replace(alone, time=alone.time + pause, begins=None) for pause in (0.0, 3000.0, 90_000.0)]
+    days = Motion.joined(later).elapsed.reshape(3, -1)
+    np.testing.assert_allclose(days - days[0], [[0.0], [3000.0], [0.0]] * np.ones_like(days), atol=1e-6)
     np.testing.assert_array_equal(Motion.joined([alone, alone]).elapsed, np.tile(alone.elapsed, 2))
     np.testing.assert_array_equal(replace(motion, begins=None).elapsed[[first, third]], 0.0)
 

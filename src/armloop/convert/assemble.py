@@ -141,9 +141,13 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
             # Gains are given base to tip, as everywhere; the map's lists are in the order of its columns.
             at = match(mapping.joints, arm.joint_names, where)
             gains = [gains[at.index(j)] for j in range(joints)]
+        if _told(tau) != {"%"}:
+            _require_like(recording, tau, "A", "--drive-gains")
         tau = replace(tau, unit=_said(tau.unit, "A"), gains=gains)
     elif answers.tau_unit is not None:
-        tau = replace(tau, unit=answers.tau_unit)
+        _require_like(recording, tau, answers.tau_unit, f"--tau-unit {answers.tau_unit}")
+        if not _told(tau) or recording.kind == "motion log":
+            tau = replace(tau, unit=answers.tau_unit)
     if answers.angle_unit is not None:
         told = {str(canonical(unit, "q")) for unit in q.units() if unit}
         if told & {"rad", "deg"} - {answers.angle_unit}:
@@ -174,6 +178,25 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     if mapping.time.column is not None and (unit is None or unit == UNSAID):
         unit = _time_unit(recording, mapping, q, v)
     return replace(mapping, time=replace(mapping.time, unit=unit), q=q, tau=tau, v=v)
+
+
+def _told(tau: QuantityMap) -> set[str]:
+    """The units of tau that a source or a map says."""
+    return {unit for said in tau.units() if (unit := canonical(said or "", "tau")) is not None}
+
+
+def _require_like(recording: Recording, tau: QuantityMap, unit: str, option: str) -> None:
+    """Raise ``LogError`` where an option says currents of what the source says are torques, or the other way round.
+
+    A motion log's torques may be currents: its header says no unit.
+    """
+    told = _told(tau)
+    wrong = {one for one in told if (one in CURRENTS) != (unit in CURRENTS)}
+    if wrong and recording.kind != "motion log":
+        raise LogError(
+            f"{recording.path}: {option}, but the {recording.kind} says itself that tau is in "
+            f"{', '.join(sorted(wrong))}; leave the option out, or write the right unit in a --map"
+        )
 
 
 def _sizes(recording: Recording, mapping: Mapping, arm: Arm | None) -> str:
@@ -257,11 +280,11 @@ def _require_units_of(mapping: Mapping, arm: Arm, order: list[int], where: str) 
 
     SI units scale nothing: sources that call all of them rad mean m where a joint slides.
     """
-    for kind, quantity in (("q", mapping.q), ("v", mapping.v)):
+    for kind, quantity in (("q", mapping.q), ("v", mapping.v), ("vdot", mapping.vdot)):
         units = [] if quantity is None else quantity.units()
         for joint, turns, source in zip(arm.joints, arm.revolute, order, strict=True):
             unit = canonical(units[source] or "", kind) if units else None
-            if unit is None or FACTORS[kind][unit] == 1.0 or (unit in ("mm", "mm/s")) != turns:
+            if unit is None or FACTORS[kind][unit] == 1.0 or unit.startswith("mm") != turns:
                 continue
             moves, wanted = ("turns", "an angle's") if turns else ("slides", "a length's")
             raise LogError(

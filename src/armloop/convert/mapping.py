@@ -7,7 +7,7 @@ The file is YAML, one field per quantity; what it leaves out is not in the sourc
     joints: [shoulder, elbow]                # names, in the order of the columns; matched with the arm's
     q: {columns: [pos_a, pos_b], unit: deg, sign: [1, -1], offset: [0, 90]}
     v: {columns: [vel_a, vel_b], unit: deg/s, sign: [1, -1]}
-    tau: {columns: "i_{1..2}", unit: A, gains: [8.1, 7.9]}   # N·m per unit of the column
+    tau: {columns: "i_{1..2}", unit: A, gains: [8.1, 7.9]}   # N·m per A (of mA, too) or per %
     keep: all                                # or the names of further columns to keep, or []
 
 A number, unit or sign stands for all joints, a list gives one per joint. An ``offset`` is in the column's unit
@@ -147,7 +147,7 @@ def check_map(mapping: Mapping, where: str) -> None:
         if any(abs(sign) != 1 for sign in per_joint(quantity.sign, n)):
             raise InputError(f"{where}: {name}: sign must be 1 or -1")
         if quantity.gains is not None and name != "tau":
-            raise InputError(f"{where}: {name}: gains belong to tau alone (N·m per unit of the column)")
+            raise InputError(f"{where}: {name}: gains belong to tau alone (N·m per A, or per % of a rating)")
         if quantity.gains is not None and not all(gain > 0 for gain in per_joint(quantity.gains, n)):
             raise InputError(f"{where}: tau: every gain must be positive; say a direction with sign")
     if isinstance(mapping.keep, str) and mapping.keep != "all":

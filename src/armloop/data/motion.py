@@ -15,6 +15,9 @@ from armloop.data.filters import filter_reach
 from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import InputError
 
+#: So many seconds without a record, a drive is as cold as at first.
+_ANOTHER = 3600.0
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -118,10 +121,11 @@ class Motion:
     def elapsed(self) -> Array:
         """(N,) seconds since the record of each sample's log began.
 
-        Runs whose clock goes on belong to one log; a clock that goes back is another's.
+        Runs whose clock goes on belong to one log; a clock that goes back is another's, and so is one that has gone on for
+        an hour, where all logs are stamped by the same.
         """
         steps = self.time[self.starts[1:]] - self.time[self.starts[1:] - 1]
-        first = np.concatenate([[True], steps <= 0])
+        first = np.concatenate([[True], (steps <= 0) | (steps > _ANOTHER)])
         lengths = np.diff(np.append(self.starts[first], self.samples))
         begins = self.time[self.starts] if self.begins is None else self.begins
         return np.asarray(self.time - np.repeat(begins[first], lengths))

@@ -90,6 +90,10 @@ def is_time_series(q: Array, runs: Sequence[slice]) -> bool:
     inside = np.concatenate([np.arange(run.start, min(run.stop, len(q)) - 1) for run in runs])
     if len(inside) == 0:
         return False
+    # what stands still throughout would look smooth
+    q = q[:, np.ptp(q, axis=0) > 0]
+    if not q.size:
+        return True
     ranks = np.argsort(np.argsort(q, axis=0, kind="stable"), axis=0, kind="stable").astype(float)
     steps = np.mean(np.square(ranks[inside + 1] - ranks[inside]), axis=0)
     ratio = steps / np.maximum(np.var(ranks, axis=0), TINY)

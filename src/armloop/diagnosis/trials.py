@@ -15,6 +15,7 @@ from armloop.diagnosis.fit import Fit, Shape, fit
 from armloop.diagnosis.judgement import CHANCE, lead
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, hypotheses
+from armloop.regression.parsimony import leaves_clearly_less
 from armloop.util.arrays import Array, Index
 from armloop.util.progress import Progress
 from armloop.util.workers import Team
@@ -22,8 +23,6 @@ from armloop.util.workers import Team
 _REFITS = 8
 #: Parameters that change by less than this part of their standard errors are the same.
 _SAME = 0.1
-#: A value between those of the grid leaves less by such a part of what it explains, and of what is left per block.
-_CLEARLY, _SURELY = 0.01, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,9 +219,9 @@ class _Grid:
         remaining = dict(zip(self.shapes, self.remaining(without).tolist(), strict=True))
         best = min((shape, *around), key=remaining.__getitem__)
         y = self.left[0 if without is None else 1 + without]
-        explained = float(np.sum(y[self.fold != without] ** 2)) - remaining[best]
-        clearly = max(_CLEARLY * explained, _SURELY * remaining[best] / blocks)
-        return best if remaining[shape] - remaining[best] > clearly else shape
+        total = float(np.sum(y[self.fold != without] ** 2))
+        less = leaves_clearly_less(remaining[best], remaining[shape], total, blocks)
+        return best if less else shape
 
 
 def _shape_problem(

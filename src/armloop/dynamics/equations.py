@@ -152,7 +152,7 @@ class RotorEquations(Equations):
 
 def of_bodies(arm: Arm, body: RigidBody, functions: Functions) -> list[Equations]:
     """The equations of links, and of the rotors that are known beside them."""
-    rotors, parameters = body.rotors, np.array(body.parameters)
+    rotors, parameters = body.rotors(arm.n), np.array(body.parameters)
     if not rotors.any():
         return [BodyEquations(arm, parameters, functions)]
     parameters[10 * arm.n :] -= rotors

@@ -149,12 +149,10 @@ class RigidBody:
         vdot = motion.vdot if step >= 3 else np.zeros_like(motion.vdot)
         n = arm.n
         tau = joint_torques(arm, self.parameters[: 10 * n], motion.q, v, vdot)
-        return tau + self.parameters[10 * n :] * vdot if len(self.parameters) > 10 * n else tau
+        return tau + self.parameters[10 * n :] * vdot if len(self.parameters) == 11 * n else tau
 
-    @property
-    def rotors(self) -> Array:
+    def rotors(self, n: int) -> Array:
         """(n,) rotor inertias that the data tell from the links' own: what turns before the gears loads no joint."""
-        n = len(self.parameters) // 11 if len(self.parameters) % 11 == 0 else len(self.parameters) // 10
         known = dict(zip(self.names, self.values.tolist(), strict=True))
         return np.array([known.get(name, 0.0) for name in rotor_names(n)])
 

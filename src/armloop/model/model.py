@@ -155,7 +155,9 @@ class ReconstructedModel:
         return self.rigid_body(motion, step) - self._of_rotors(motion, step)
 
     def _of_rotors(self, motion: Motion, step: int = 3) -> Array:
-        rotors = [component.rotors for component in self.components if isinstance(component, RigidBody)]
+        rotors = [
+            component.rotors(self.arm.n) for component in self.components if isinstance(component, RigidBody)
+        ]
         return np.sum(rotors, axis=0) * motion.vdot if rotors and step >= 3 else np.zeros_like(motion.q)
 
     def predict(self, motion: Motion, step: int = 3, sensors: bool = True) -> Array:

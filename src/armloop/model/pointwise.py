@@ -57,7 +57,8 @@ def pointwise(parts: Parts, step: int) -> InverseDynamics:
     bodies += [_energies(c, step) for c in components if isinstance(c, Lagrangian)]
     laws = [_friction(joint) for joint in friction]
     rotors = np.sum(
-        [np.zeros(arm.n), *(c.rotors for c in components if isinstance(c, RigidBody) and step >= 3)], axis=0
+        [np.zeros(arm.n), *(c.rotors(arm.n) for c in components if isinstance(c, RigidBody) and step >= 3)],
+        axis=0,
     )
 
     def torque(q: Array, v: Array, vdot: Array, sliding: Array | None = None) -> Array:

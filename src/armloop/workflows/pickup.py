@@ -42,6 +42,10 @@ def run_pickup_scenario(
         raise InputError(
             f"--model: {scenario.name} needs a model named step3 or model; given: {', '.join(chosen)}"
         )
+    if unused := [name for name in models if name not in ("step3", MAIN_MODEL)]:
+        raise InputError(
+            f"--model: {scenario.name} is run with one named step3 or model; nothing would run with {', '.join(unused)}"
+        )
     progress(f"tracking {scenario.reference.duration:g} s; a load is grasped on the way")
     found: list[Diagnosis] = []
 

@@ -63,6 +63,17 @@ def test_the_log_is_that_of_the_loaded_arm(run):
     assert np.all(residual[1] < 0.15) and residual[0][1] > 1.0
 
 
+def test_a_grasp_between_two_samples_loses_none(run):
+    scenario, ignorant, knowing, *_ = run
+    odd = dataclasses.replace(scenario, pickup=Pickup(0.9995, 2.0, scenario.pickup.payload))
+    found = run_pickup(odd, ignorant, lambda log: knowing).phases
+    whole = found["loaded"]
+    assert len(whole.time) == 3001
+    np.testing.assert_allclose(np.diff(whole.time), 1e-3, atol=1e-9)
+    # the reference beside it is that of the same instants
+    np.testing.assert_allclose(found["augmented"].eta, run[3].phases["augmented"].eta, rtol=0.2)
+
+
 def test_what_is_wrong_with_a_pickup_is_told(tmp_path):
     text = "plant: three_axis\nreference: {periods: 2}\n"
     path = tmp_path / "mine.yaml"

@@ -12,8 +12,9 @@ import pytest
 from synthetic import three_axis
 
 from armloop.drake.experiments import scenario_references as module
-from armloop.drake.experiments.scenario_references import reference_of
+from armloop.drake.experiments.scenario_references import reference_of, require_own_fields
 from armloop.experiment.excitation import MotionRanges
+from armloop.schemas.scenarios import ReferenceData
 from armloop.util.errors import ScenarioError
 
 ARM = three_axis()
@@ -98,3 +99,23 @@ def test_two_places_of_all_joints_and_a_files_path(places: list[list[float]]) ->
         of(kind="places", places=places, dwell=0.5, pace=0.4)
     with pytest.raises(ScenarioError, match=r"reference\.file is missing"):
         of(kind="csv", file="")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"places": [[0.0, 0.0, 0.0], [0.1, 0.1, 0.1]]}, "reference.places belongs to kind: places"),
+        ({"file": "some.csv"}, "reference.file belongs to kind: csv; this reference is of kind paper"),
+        ({"kind": "fourier", "periods": 3}, "reference.periods belongs to kind: paper"),
+        ({"kind": "places", "duration": 20.0}, "reference.duration belongs to kind: fourier"),
+    ],
+)
+def test_a_field_of_another_kind_is_refused(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ScenarioError, match=said):
+        require_own_fields(ReferenceData(**given), "a.yaml")
+
+
+def test_fields_of_its_own_and_defaults_are_not() -> None:
+    require_own_fields(ReferenceData(kind="places", places=[[0.0], [1.0]], dwell=0.1, pace=2.0), "a.yaml")
+    require_own_fields(ReferenceData(kind="fourier", duration=20.0, periods=2), "a.yaml")
+    require_own_fields(ReferenceData(kind="no such kind", periods=3), "a.yaml")  # told of elsewhere

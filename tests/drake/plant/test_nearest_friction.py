@@ -65,6 +65,34 @@ def test_of_another_form_the_mean_of_both_ways_is_fitted(arm) -> None:
     assert numbers(found[2]) == (0.0, 0.0, 0.1, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "joints", "parameters", "more"),
+    [
+        ("presliding_hysteresis", (2, None), {"level": 0.7, "width": 0.01, "level_change": 0.0}, (0.7, 0.0)),
+        ("viscous_asymmetry", (2, None), {"coefficient": 0.7}, (0.0, 0.0)),
+        (
+            "transmission_coupling",
+            (1, 2),
+            {"inertia": 0.0, "viscous": 0.3, "coulomb": 0.7, "ratio": 1.0},
+            (0.7, 0.3),
+        ),
+        (
+            "transmission_coupling",
+            (2, 3),
+            {"inertia": 0.0, "viscous": 0.3, "coulomb": 0.7, "ratio": -1.0},
+            (0.7, 0.3),
+        ),
+    ],
+)
+def test_every_law_that_rubs_is_a_part_of_it(arm, name, joints, parameters, more) -> None:
+    law = (FrictionTerm("sign", 0.25), FrictionTerm("viscous", 1.0))
+    added = AddedEffect(effect(name, *joints), {key: Estimate(x, 0.0, "1") for key, x in parameters.items()})
+    found = nearest.nearest_friction(of_joints(arm, law, law, law).with_effects([added]))
+    for joint in range(3):
+        level, slope = more if joint + 1 in joints else (0.0, 0.0)
+        assert_allclose([found[joint].coulomb, found[joint].viscous], [0.25 + level, 1.0 + slope], atol=1e-6)
+
+
 def test_the_fit_finds_the_velocity_of_its_grid() -> None:
     v = np.geomspace(1e-3, 1.0, 60) * 2.0
     for part in nearest._VELOCITIES[[0, 17, 39]]:

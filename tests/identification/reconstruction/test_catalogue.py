@@ -116,6 +116,18 @@ def test_a_ripple_of_low_order_is_fitted_together_with_the_rest(library: str) ->
     assert max(found.held_out.moving["nrmse"]) < 0.02
 
 
+def test_a_ripple_of_a_motor_behind_a_gear_is_found_between_whole_orders() -> None:
+    """Whole ones would need two, neither of which is there."""
+    found = made([lambda motion: np.outer(np.sin(14.4 * motion.q[:, 1] + 0.7), [0, 1, 0])])
+    assert named(found) == [("torque_ripple", 2, None)]
+    parameters = found.model.effects[0].parameters
+    assert parameters["order"].value == pytest.approx(14.4, abs=0.1)
+    assert parameters["amplitude"].value == pytest.approx(1.0, abs=0.03)
+    # read off what the model leaves, of which the base parameters have soaked up some
+    assert np.isnan(parameters["order"].std_error) and np.isnan(parameters["phase"].std_error)
+    assert max(found.held_out.moving["nrmse"]) < 0.02
+
+
 def test_several_ripples_of_a_joint_are_found() -> None:
     def twice(motion: Motion) -> Array:
         return np.outer(

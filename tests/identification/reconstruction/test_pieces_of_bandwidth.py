@@ -85,6 +85,14 @@ def test_every_third_instant_of_two_logs() -> None:
     assert thin.motion.starts.tolist() == [0, 2] and thin.stride == 6
 
 
+def test_a_run_between_every_third_instant_has_none() -> None:
+    motion = replace(standing(9, 1), q=np.arange(9.0)[:, None], starts=np.array([0, 1, 2, 4, 6, 8]))
+    whole = Table(motion.q[:, :, None], motion.q, np.arange(9), motion.q > 2, motion, 1)
+    thin = whole.every(3)
+    # 0, 3 and 6: of the first run, the third and the fifth
+    assert thin.motion.q[:, 0].tolist() == [0.0, 3.0, 6.0] and thin.motion.starts.tolist() == [0, 1, 2]
+
+
 class TestPieces:
     @pytest.fixture
     def compared(self, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:

@@ -14,6 +14,7 @@ from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import lines, ripple
 from armloop.identification.reconstruction.ripple import Residual
+from armloop.laws.effects.torque_ripple import TorqueRipple
 from armloop.robot.arm import load_arm
 
 ORDERS = np.arange(1.0, 201.0)
@@ -43,6 +44,36 @@ def test_a_line_has_the_coefficients_and_the_errors_of_least_squares_over_blocks
     bread, after = np.linalg.inv(X.T @ X), left.left - X @ x
     scores = np.array([X[left.block == k].T @ after[left.block == k] for k in range(40)])
     np.testing.assert_allclose(covariance, bread @ scores.T @ scores @ bread)
+
+
+@pytest.mark.parametrize(
+    ("order", "found"), [(100.37, 100.37), (99.6, 99.6), (100.01, 100.0), (100.0, 100.0)]
+)
+def test_behind_a_gear_an_order_is_any_number_and_has_an_error(order: float, found: float) -> None:
+    """A hundredth off, the whole number stands for it: it says 99 % of what is there."""
+    q = np.sort(np.random.default_rng(1).uniform(-1, 2, 4000))
+    block = np.arange(4000) // 100
+    y = 0.3 * np.sin(order * q) + 0.4 * np.cos(order * q) + 0.2 * np.random.default_rng(2).normal(size=4000)
+    line = ripple._line(Residual(q, y, block), ORDERS, 3)
+    assert line is not None
+    exact, x, covariance = line
+    p = TorqueRipple(1).estimates(three_axis(), x, covariance, exact)
+    if found == round(found):
+        assert exact == found and p["order"].std_error == 0 and len(x) == 2
+        return
+    # of a phase that is known to s, over a travel of 3 rad: s sqrt(12) / 3
+    amplitude = 0.2 * np.sqrt(2 / 4000)
+    assert abs(exact - found) < 4 * p["order"].std_error
+    assert p["order"].std_error == pytest.approx(amplitude / 0.5 * np.sqrt(12) / 3, rel=0.3)
+    assert p["amplitude"].value == pytest.approx(0.5, abs=4 * amplitude)
+    assert p["phase"].value == pytest.approx(np.arctan2(0.4, 0.3), abs=4 * float(p["phase"].std_error))
+
+
+def test_an_order_that_others_stand_for_is_not_left_for_another_whole_one() -> None:
+    """What lies a whole order away is a line of its own."""
+    q = np.linspace(-0.5, 0.5, 2000)
+    assert lines.between(q, np.sin(21.3 * q), 20.0, 40) == 20.0
+    assert lines.between(q, np.sin(20.7 * q), 20.0, 40) == pytest.approx(20.7)
 
 
 def test_noise_has_no_line_nor_has_what_a_few_blocks_hold() -> None:

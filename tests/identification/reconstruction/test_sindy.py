@@ -13,6 +13,7 @@ from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.sindy import sindy
 from armloop.identification.reconstruction.stepwise import stepwise_on
 from armloop.regression.sparse import Sparse
+from armloop.util.errors import InputError
 from armloop.util.progress import silent
 
 OPTIONS = Options(sparse=Sparse(correlation=1.0), max_order=1)
@@ -62,3 +63,15 @@ def test_held_out_samples_are_not_fitted_by_the_baseline(samples):
     spoilt = replace(samples, tau=np.where(held[:, None], 1e3, samples.tau))
     one, other = (sindy(three_axis(), s, held, OPTIONS, silent) for s in (samples, spoilt))
     np.testing.assert_array_equal(one.components[0].coefficients, other.components[0].coefficients)
+
+
+def test_the_lowest_order_is_tried_however_many_candidates_are_allowed(samples):
+    held = folds(samples, 5, 1.0) == 0
+    found = sindy(three_axis(), samples, held, Options(max_candidates=3), silent)
+    assert [report.orders for report in found.reports] == [[1, 2]]
+
+
+def test_more_candidates_than_samples_are_refused(samples, monkeypatch):
+    monkeypatch.setattr("armloop.identification.reconstruction.sindy._MOST_SAMPLES", 100)
+    with pytest.raises(InputError, match=r"one-shot regression of 3 joints has .* use --method stepwise"):
+        sindy(three_axis(), samples, folds(samples, 5, 1.0) == 0, Options(), silent)

@@ -69,14 +69,18 @@ def test_stribeck_velocities_go_from_a_hundredth_to_one_each_by_the_same_factor(
 
 class TestFriction:
     @staticmethod
-    def found(v: np.ndarray, moving: np.ndarray, *kinds: str) -> Any:
+    def found(
+        v: np.ndarray, moving: np.ndarray, *kinds: str, turning: tuple[bool, ...] = (True, True)
+    ) -> Any:
         usable = SimpleNamespace(moving=moving, motion=SimpleNamespace(v=v))
 
         class Choice(SimpleNamespace):
             def __call__(self, chunk: Any) -> Any:
                 return usable
 
-        choice: Any = Choice(inherited=SimpleNamespace(arm=SimpleNamespace(joints=range(v.shape[1]))))
+        choice: Any = Choice(
+            inherited=SimpleNamespace(arm=SimpleNamespace(joints=range(v.shape[1]), revolute=turning))
+        )
         data: Any = SimpleNamespace(reference=None)
         return steps._friction(data, choice, plan(*kinds))
 
@@ -99,6 +103,9 @@ class TestFriction:
         assert second == (FrictionTerm("sign"),)
         moving[:, 1] = False
         assert len(self.found(v, moving, "stribeck")[1]) == len(grid)
+        # of a joint that slides, in m/s
+        (_, sliding) = self.found(v, moving, "stribeck", turning=(True, False))
+        assert [term.parameter for term in sliding] == [0.1 * x for x in grid]
 
 
 def test_fits_of_which_hardly_anything_is_left_are_refined_on_the_samples() -> None:

@@ -49,6 +49,17 @@ def test_the_variance_between_logs_is_found_where_there_is_one(seed: int) -> Non
     assert between_logs(left[:, None], rows & (logs < 2)[:, None], motion, blocks) == [None]
 
 
+@pytest.mark.parametrize(("logs", "blocks"), [(8, 8), (20, 10), (4, 40)])
+def test_logs_that_do_not_differ_are_rarely_said_to(logs: int, blocks: int) -> None:
+    """Nominally one in a thousand: by chi-square, as if covariances of eight blocks were known, it was one in ten."""
+    motion, rng = sines(logs, rate=20.0, seconds=2.0 * blocks), np.random.default_rng(logs)
+    block = np.arange(len(motion.time)) // 40
+    rows = np.ones((len(block), 1), dtype=bool)
+    noise = rng.normal(size=(200, len(block), 1))
+    found = [between_logs(left, rows, motion, block) != [None] for left in noise]
+    assert sum(found) <= 6
+
+
 def test_a_log_that_creeps_tells_no_slope() -> None:
     """As the static log of a collection: what a model gets wrong there is no viscous friction that differs at speed."""
     motion, rng = sines(4), np.random.default_rng(1)

@@ -72,8 +72,9 @@ def run_pickup(
     loaded.integrator().SetDiscreteState(free.integrator().get_discrete_state_vector().CopyToVector())
     loaded.advance(scenario.reference.duration)
     first, second = (run.arm.recorded(run.context) for run in (free, loaded))
-    # both recorded the moment of the grasp
-    time, state, tau, asked = (np.concatenate([a[:-1], b]) for a, b in zip(first, second, strict=True))
+    # both recorded the moment of the grasp, where a sample falls on it
+    before = first[0] < second[0][0] - 0.5 * scenario.plant.config.time_step
+    time, state, tau, asked = (np.concatenate([a[before], b]) for a, b in zip(first, second, strict=True))
     ends = (0.0, pickup.at, pickup.diagnose_at, scenario.reference.duration)
     phases = {}
     for k, name in enumerate(PHASES):

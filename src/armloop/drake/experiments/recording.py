@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.log import MotionLog
+from armloop.data.log import MotionLog, unchecked_log
 from armloop.drake.plant.config import Instruments
 from armloop.drake.plant.plant import ArmPlant
 from armloop.util.arrays import Array
@@ -64,7 +64,12 @@ def as_log(
         now = float(time[-1][-1]) + 20 * period
     q, v, tau = (np.concatenate([getattr(r, key) for r in recordings]) for key in ("q", "v", "tau"))
     tau = instruments.sense(tau, rng)
-    # No more digits than the instruments have: the files stay small.
-    return MotionLog(
-        np.concatenate(time).round(6), np.round(q, 9), np.round(v, 7), np.round(tau, 6), name=name
+    # No more digits than the instruments have: the files stay small. What a loop does that is not stable no recorder would
+    # be believed, and happened here nevertheless.
+    return unchecked_log(
+        time=np.concatenate(time).round(6),
+        q=np.round(q, 9),
+        v=np.round(v, 7),
+        tau=np.round(tau, 6),
+        name=name,
     )

@@ -22,6 +22,14 @@ from armloop.util.errors import LogError, ScenarioError
 
 LONGEST = 600.0  # s of a tracking run
 
+#: What a reference of each kind looks at.
+_FIELDS = {
+    "paper": ("unit", "periods"),
+    "fourier": ("duration",),
+    "csv": ("file",),
+    "places": ("places", "dwell", "pace"),
+}
+
 
 def reference_of(
     data: ReferenceData, arm: Arm, ranges: MotionRanges, seed: int, path: Path, where: str
@@ -46,6 +54,17 @@ def reference_of(
         )
     given = {"csv": ".file", "places": ".places"}.get(data.kind, "")
     return _possible(reference, arm, f"{where}: reference{given}")
+
+
+def require_own_fields(data: ReferenceData, where: str) -> None:
+    """Raise `ScenarioError` for a field that no reference of this kind looks at."""
+    plain, own = ReferenceData(), _FIELDS.get(data.kind)
+    for kind, fields in _FIELDS.items():
+        for field in fields:
+            if own is not None and field not in own and getattr(data, field) != getattr(plain, field):
+                raise ScenarioError(
+                    f"{where}: reference.{field} belongs to kind: {kind}; this reference is of kind {data.kind}"
+                )
 
 
 def reference_from(given: str | Path | ReferenceLike, arm: Arm) -> Reference:

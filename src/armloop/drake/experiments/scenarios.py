@@ -19,7 +19,11 @@ from armloop.drake.control.reference import ReferenceLike
 from armloop.drake.control.scenario_types import Pickup, Plant, TrackingScenario, Wear
 from armloop.drake.experiments.collection import CollectionPlan
 from armloop.drake.experiments.scenario_files import beside, entry, per_joint, read, scenario_entry
-from armloop.drake.experiments.scenario_references import reference_from, reference_of
+from armloop.drake.experiments.scenario_references import (
+    reference_from,
+    reference_of,
+    require_own_fields,
+)
 from armloop.drake.plant.config import Instruments, PlantConfig
 from armloop.drake.plant.fault_injection import UndeclaredEffect, realise
 from armloop.drake.plant.friction import JointFriction
@@ -141,6 +145,7 @@ def load_tracking(
     plant, rate, used = _limited(data.limits, _plant_of(data, name, path, where, arm), where)
     n, period = plant.arm.n, plant.config.time_step
     if motion is None:
+        require_own_fields(data.reference, where)
         reference = reference_of(
             data.reference, plant.arm, plant.config.ranges, data.random_seed, path, where
         )

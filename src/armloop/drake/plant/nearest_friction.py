@@ -8,7 +8,7 @@ from scipy.optimize import nnls
 from armloop.drake.plant.friction import JointFriction
 from armloop.dynamics import ModelEquations, training_range
 from armloop.laws.friction import stribeck_fall
-from armloop.model import ReconstructedModel
+from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array
 from armloop.util.functions import NUMPY
 
@@ -28,7 +28,7 @@ def nearest_friction(model: ReconstructedModel) -> tuple[JointFriction, ...]:
     found: list[JointFriction] = []
     curves: tuple[Array, Array] | None = None
     for j, terms in enumerate(model.friction.terms):
-        effects = [a for a in model.effects if a.effect.joint == j + 1 and a.effect.name.endswith("friction")]
+        effects = [a for a in model.effects if j in a.effect.indices and _rubs(a)]
         p = model.friction.stribeck_parameters(j)
         if p and {t.kind for t in terms} <= _EXACT and not effects:
             static, coulomb = max(p["static"], 0.0), max(p["coulomb"], 0.0)
@@ -40,8 +40,13 @@ def nearest_friction(model: ReconstructedModel) -> tuple[JointFriction, ...]:
     return tuple(found)
 
 
+def _rubs(added: AddedEffect) -> bool:
+    law = added.placed()
+    return law is not None and any(term.element.part == "friction" for term in law.terms)
+
+
 def _curves(model: ReconstructedModel) -> tuple[Array, Array]:
-    """Speeds (K, n) and the mean friction at them, (K, n)."""
+    """Speeds (K, n) and the mean friction at them, (K, n), of each joint that turns alone."""
     n = model.arm.n
     speeds = np.geomspace(1e-3, 1.0, _SPEEDS)[:, None] * np.maximum(model.ranges[1], 1e-2)
     lower, upper = training_range(model)
@@ -51,11 +56,12 @@ def _curves(model: ReconstructedModel) -> tuple[Array, Array]:
     load = equations.load([q[:, j] for j in range(n)], still, still)
     sizes = [np.abs(np.broadcast_to(x, (_POSTURES,))).mean() for x in load]
     loads = [np.full(_SPEEDS, x) for x in sizes]
-    ways = []
-    for way in (1.0, -1.0):
-        friction = equations.friction([way * speeds[:, j] for j in range(n)], loads, 1e300)
-        ways.append(way * np.stack([np.broadcast_to(x, (_SPEEDS,)) for x in friction], axis=1))
-    return speeds, 0.5 * (ways[0] + ways[1])
+    curves = np.zeros((_SPEEDS, n))
+    for j in range(n):
+        for way in (1.0, -1.0):
+            v = [way * speeds[:, j] if k == j else np.zeros(_SPEEDS) for k in range(n)]
+            curves[:, j] += 0.5 * way * equations.friction(v, loads, 1e300)[j]
+    return speeds, curves
 
 
 def _fitted(v: Array, friction: Array) -> JointFriction:

@@ -179,7 +179,10 @@ class Table:
     def every(self, step: int) -> Table:
         """Every so many instants."""
         thin = slice(None, None, step)
-        some = self.motion.take(thin, -(-self.motion.starts // step))
+        kept = np.arange(len(self.tau))[thin]
+        # a run between two of them has none
+        starts = np.unique(np.searchsorted(kept, self.motion.starts))
+        some = self.motion.take(thin, starts[starts < len(kept)].astype(np.intp))
         return Table(
             self.columns[thin], self.tau[thin], self.blocks[thin], self.moving[thin], some, self.stride * step
         )

@@ -25,7 +25,7 @@ from scipy.stats import t as student
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
-from armloop.identification.reconstruction.lines import lines
+from armloop.identification.reconstruction.lines import between, lines
 from armloop.identification.reconstruction.projected import CHANCE, Projected, Trial
 from armloop.laws.effects import Context, Effect, hypotheses
 from armloop.model import AddedEffect
@@ -97,7 +97,7 @@ class Laws:
     def raw(self, arm: Arm, motion: Motion, period: float) -> Array:
         """(N, n, p) torque per unit of each coefficient, unfiltered."""
         context = Context(arm, motion, period=period)
-        parts = [law.effect.full_columns(context, law.shape) for law in self.chosen]
+        parts = [law.effect.fixed_columns(context, law.shape) for law in self.chosen]
         return np.concatenate([np.zeros((motion.samples, arm.n, 0)), *parts], axis=2)
 
     def columns(self, arm: Arm, samples: Samples) -> Array:
@@ -117,7 +117,7 @@ class Laws:
                 parts.append(np.zeros((len(q), n, n, law.size)))
                 continue
             both = [
-                law.effect.full_columns(Context(arm, motion), law.shape)
+                law.effect.fixed_columns(Context(arm, motion), law.shape)
                 for motion in (pushed, replace(pushed, vdot=pushed.v))
             ]
             added = (both[0] - both[1]).reshape(len(q), n, n, law.size)
@@ -200,7 +200,7 @@ def search(
         progress(
             f"{effect.label()}: fitted together with the rest it removes {trial.share:.0%} on left-out blocks"
         )
-        chosen.append(Law.found(effect, shape, effect.full_columns(context, shape), trial.share, among))
+        chosen.append(Law.found(effect, shape, effect.fixed_columns(context, shape), trial.share, among))
     return Laws(chosen, tried)
 
 
@@ -229,10 +229,12 @@ def _plausible(arm: Arm, effect: Effect, shape: float, found: Trial) -> bool:
 def _peaks(own: Projected, effect: Effect, orders: Sequence[float], context: Context) -> list[float]:
     """Orders at which what the regression leaves of an effect's joint has a line over the angle, and those beside them."""
     assert effect.joint is not None
-    sample, left = own.left(effect.joint - 1)
+    sample, left, block = own.left(effect.joint - 1)
     q = context.motion.q[sample, effect.joint - 1]
-    near = {peak + beside for peak in lines(q, left, orders, WORTH) for beside in (-1.0, 0.0, 1.0)}
-    return sorted(near & set(orders))
+    peaks = list(lines(q, left, orders, WORTH))
+    near = {peak + beside for peak in peaks for beside in (-1.0, 0.0, 1.0)} & set(orders)
+    # of a motor behind a gear an order need not be whole
+    return sorted(near | {between(q, left, peak, len(np.unique(block))) for peak in peaks})
 
 
 def _best_shape(
@@ -241,7 +243,7 @@ def _best_shape(
     """The shape that removes most on left-out blocks; None where the effect can say nothing new."""
     best: tuple[float, Trial] | None = None
     for shape in shapes:
-        trial = own.trial(_smoothed(samples, effect.full_columns(context, shape)), _NEW, WORTH)
+        trial = own.trial(_smoothed(samples, effect.fixed_columns(context, shape)), _NEW, WORTH)
         if trial is not None and (best is None or trial.removed > best[1].removed):
             best = shape, trial
     return best

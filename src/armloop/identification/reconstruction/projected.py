@@ -114,10 +114,10 @@ class Projected:
         good = values > _DISTINCT * values[-1]
         self._span = vectors[:, good] / size[:, None] / np.sqrt(values[good])
 
-    def left(self, joint: int) -> tuple[Index, Array]:
-        """(M,) samples of a joint (0-based), and what fits without their folds leave of them, weighted."""
+    def left(self, joint: int) -> tuple[Index, Array, Index]:
+        """(M,) samples of a joint (0-based), what fits without their folds leave of them, weighted, and their blocks."""
         own = self._rows.joint == joint
-        return self._rows.sample[own], self._left[own]
+        return self._rows.sample[own], self._left[own], self._rows.block[own]
 
     def trial(self, columns: Array, new: float = 0.0, worth: float = 0.0) -> Trial | None:
         """Judge further columns; None where they say nothing new, or cannot be worth it.

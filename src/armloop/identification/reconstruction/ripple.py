@@ -20,7 +20,7 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.signals import ShortRunError, preprocess
 from armloop.identification.reconstruction.inner_folds import FOLDS
-from armloop.identification.reconstruction.lines import MOST, lines, waves
+from armloop.identification.reconstruction.lines import MOST, between, change, lines, waves
 from armloop.identification.reconstruction.projected import CHANCE, block_covariance, block_score
 from armloop.laws.effects import Context
 from armloop.laws.effects.torque_ripple import TorqueRipple
@@ -68,7 +68,7 @@ def find_ripple(
                 break
             order, x, covariance = line
             found.append(AddedEffect(effect, effect.estimates(model.arm, x, covariance, order), "always"))
-            left = Residual(left.q, left.left - waves(left.q, order) @ x, left.block)
+            left = Residual(left.q, left.left - waves(left.q, order) @ x[:2], left.block)
     return found
 
 
@@ -78,7 +78,10 @@ def notes(effects: Sequence[AddedEffect]) -> list[str]:
 
 
 def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Array] | None:
-    """Order, coefficients of sine and cosine, and their covariance, of the line that stands out most; or None."""
+    """Order, coefficients of sine and cosine, and their covariance, of the line that stands out most; or None.
+
+    Of an order between whole ones the third coefficient is a change of it, zero but for its error.
+    """
     for order in lines(left.q, left.left, orders.tolist(), _WORTH):
         X, y = waves(left.q, order), left.left
         after, fold = np.array(y), left.block % FOLDS
@@ -87,9 +90,14 @@ def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Arr
             after[mine] -= X[mine] @ np.linalg.lstsq(X[~mine], y[~mine], rcond=None)[0]
         score, blocks = block_score(y**2, after**2, left.block)
         if score > student.isf(CHANCE / (len(orders) * joints), blocks - 1):
+            exact = between(left.q, y, order, blocks)
+            X = waves(left.q, exact)
+            x = np.asarray(np.linalg.lstsq(X, y, rcond=None)[0], dtype=float)
+            rest = y - X @ x
+            if exact != order:
+                X, x = np.column_stack([X, change(left.q, exact, x)]), np.append(x, 0.0)
             bread = np.asarray(np.linalg.inv(X.T @ X), dtype=float)
-            x = bread @ (X.T @ y)
-            return order, x, block_covariance(bread, X * np.asarray(y - X @ x)[:, None], left.block)
+            return exact, x, block_covariance(bread, X * rest[:, None], left.block)
     return None
 
 

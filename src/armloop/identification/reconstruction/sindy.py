@@ -21,7 +21,7 @@ from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Mask
-from armloop.util.errors import ExcitationError
+from armloop.util.errors import ExcitationError, InputError
 from armloop.util.progress import Progress
 
 #: Thresholds as a share of each joint's torque; ridges as a share of the columns' squared size.
@@ -55,7 +55,8 @@ def sindy(arm: Arm, samples: Samples, held_out: Mask, options: Options, progress
     best: tuple[float, DoubleFeatureSet, Array] | None = None
     for N1 in range(1, options.max_order + 1):
         library = DoubleFeatureSet(revolute, N1, 2, "both")
-        if library.size > options.max_candidates:
+        # of the lowest order as many as there may be samples
+        if library.size > (options.max_candidates if N1 > 1 else _MOST_SAMPLES):
             break
         progress(f"sindy: {library.size} candidates of order ({N1}, 2)")
         X, signs = library.columns(samples.motion.take(rows)), np.sign(samples.motion.v[rows])
@@ -70,7 +71,11 @@ def sindy(arm: Arm, samples: Samples, held_out: Mask, options: Options, progress
             if best is None or errors[-1] < best[0]:
                 best = (errors[-1], library, coefficients)
         trials.append(([N1, 2], min(errors)))
-    assert best is not None
+    if best is None:
+        raise InputError(
+            f"one-shot regression of {arm.n} joints has {library.size} candidates at its lowest order, more than the "
+            f"{_MOST_SAMPLES} samples it is given; use --method stepwise, whose libraries scale"
+        )
     _, library, coefficients = best
     full = DoubleFeatureSet(revolute, library.N1, 2, "both", independent=False).size
     kept = coefficients[:, : library.size].any(axis=0)

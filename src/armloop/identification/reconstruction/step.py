@@ -29,7 +29,8 @@ from armloop.regression.sparse import Sparse
 from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import ExcitationError, InputError
 
-#: Sect. 4.3 lists v_s = 0.01 … 1; a geometric grid resolves the small ones as finely as the large ones.
+#: rad/s, and tenths of it m/s. Sect. 4.3 lists v_s = 0.01 … 1; a geometric grid resolves the small
+#: ones as finely as the large ones.
 STRIBECK_GRID = tuple(float(v) for v in np.round(np.geomspace(0.01, 1.0, 60), 4))
 
 _FEWEST_SAMPLES = 30
@@ -237,12 +238,13 @@ def _friction(data: Data, choice: Choice, plan: StepPlan) -> tuple[tuple[Frictio
     fixed = tuple(FrictionTerm(kind) for kind in plan.friction if kind != "stribeck")
     if "stribeck" not in plan.friction:
         return (fixed,) * len(choice.inherited.arm.joints)
-    usable, found = choice(data.reference), []
+    usable, found, revolute = choice(data.reference), [], choice.inherited.arm.revolute
     for j in range(usable.moving.shape[1]):
         speeds = np.abs(usable.motion.v[usable.moving[:, j], j])
         # Below the slowest reliable speed an exponential cannot be told from the level itself.
         slowest = float(np.quantile(speeds, 0.02)) if len(speeds) else 0.0
-        profile = (FrictionTerm("stribeck", parameter=vs) for vs in STRIBECK_GRID if vs > slowest)
+        grid = STRIBECK_GRID if revolute[j] else [0.1 * vs for vs in STRIBECK_GRID]
+        profile = (FrictionTerm("stribeck", parameter=vs) for vs in grid if vs > slowest)
         found.append((*fixed, *profile))
     return tuple(found)
 

@@ -3,16 +3,18 @@
 A drive that warms up, another load of grease: within a log nothing shows it, and so no held-out block and no standard error
 does. Of what the model leaves, each log tells a level and a slope along its joint's direction, with the covariance of its
 own blocks; how far those lie apart beyond that is the variance between logs, by maximum likelihood (EM; Laird and Ware,
-Biometrics 38, 1982). Where logs do not differ by more than chance (Cochran's Q) it is zero. A log that stays slow tells
+Biometrics 38, 1982). Where logs do not differ by more than chance it is zero (the Welch-James test: covariances from few
+blocks are uncertain themselves; Johansen, Biometrika 67, 1980). A log that stays slow tells
 nothing of the slope: what a model gets wrong near standstill is no friction that differs at speed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import f as f_distribution
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
@@ -57,19 +59,21 @@ def between_logs(
 
 
 def _variance(left: Array, v: Array, blocks: Index, logs: Index) -> list[list[float]] | None:
-    found = []
+    found, counts = [], []
     for log in np.unique(logs):
         own = logs == log
+        count = len(np.unique(blocks[own]))
         fast = np.abs(v[own]).max() >= _FAST * np.abs(v).max()
-        if fast and len(np.unique(blocks[own])) >= _BLOCKS:
+        if fast and count >= _BLOCKS:
             X = np.column_stack([np.sign(v[own]), v[own]])
             b = np.linalg.lstsq(X, left[own], rcond=None)[0]
+            counts.append(count)
             found.append((b, clustered_covariance(X, left[own] - X @ b, blocks[own])))
     if len(found) < _LOGS:
         return None
     b, S = (np.array(each) for each in zip(*found, strict=True))
     d, precise = _apart(b, S)
-    if chi2.sf(np.einsum("gi,gij,gj->", d, precise, d), 2 * (len(b) - 1)) > _CHANCE:
+    if _chance(d, precise, counts) > _CHANCE:
         return None
     T = d.T @ d / len(b)
     for _ in range(_ITERATIONS):
@@ -80,6 +84,18 @@ def _variance(left: Array, v: Array, blocks: Index, logs: Index) -> list[list[fl
     # the model was fitted to the logs themselves: their mean is theirs
     T = 0.5 * (T + T.T) * len(b) / (len(b) - 1)
     return [[float(x) for x in row] for row in T]
+
+
+def _chance(d: Array, precise: Array, counts: Sequence[int]) -> float:
+    """Probability that estimates of the same lie so far apart, d (G, k), by precisions (G, k, k) from so many blocks."""
+    G, k = d.shape
+    own = np.eye(k) - np.linalg.pinv(precise.sum(axis=0)) @ precise
+    traces = np.trace(own @ own, axis1=1, axis2=2) + np.trace(own, axis1=1, axis2=2) ** 2
+    A = 0.5 * float(np.sum(traces / (np.array(counts) - 1.0)))
+    freedom = k * (G - 1)
+    scale = freedom + 2 * A - 6 * A / (freedom + 2)
+    Q = float(np.einsum("gi,gij,gj->", d, precise, d))
+    return float(f_distribution.sf(Q / scale, freedom, freedom * (freedom + 2) / (3 * A)))
 
 
 def _apart(b: Array, covariance: Array) -> tuple[Array, Array]:

@@ -90,7 +90,7 @@ class Estimate:
 
 def with_error(value: float, error: float) -> str:
     """A number and its standard error, both to the second digit of the error."""
-    places = int(np.clip(1 - np.floor(np.log10(error)), 0, 6))
+    places = int(np.clip(1 - np.floor(np.log10(error)), 0, 12))
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
@@ -347,6 +347,10 @@ class Effect(ABC):
     def full_columns(self, context: Context, shape: float) -> Array:
         """(N, n, p) columns on all joints."""
         return self.on_all_joints(self.columns(context, shape), context.arm.n)
+
+    def fixed_columns(self, context: Context, shape: float) -> Array:
+        """(N, n, p) of the free parameters alone, on all joints, at a nonlinear parameter that stays as it is."""
+        return self.full_columns(context, shape)
 
     def on_all_joints(self, columns: Array, joints: int) -> Array:
         """(N, n, p) of columns on the effect's own joint (N, p); others as they are."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from armloop.laws.effects.base import Array, Context, Estimate, Parameter, number
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
+from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY
 
 
@@ -45,6 +47,9 @@ class TorqueRipple(Law):
             return own
         return np.hstack([own, context.motion.q[:, [self.index]] * own[:, ::-1] * [1.0, -1.0]])
 
+    def fixed_columns(self, context: Context, shape: float) -> Array:
+        return self.on_all_joints(super().columns(context, shape), context.arm.n)
+
     def start(self, beta: Array) -> Array:
         if len(beta) == len(self.elements):
             return beta
@@ -59,6 +64,13 @@ class TorqueRipple(Law):
 
     def named(self, x: Array, shape: float) -> tuple[float, ...]:
         return float(np.hypot(*x[:2])), shape + float(x[2:].sum()), float(np.arctan2(x[1], x[0]))
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        found = super().estimates(arm, x, covariance, shape)
+        if len(x) == len(self.elements) and not float(shape).is_integer():
+            # nobody knows by how much the order is off, nor the phase, which is taken at q = 0
+            found |= {key: replace(found[key], std_error=np.nan) for key in ("order", "phase")}
+        return found
 
     def refined(self, x: Array, shape: float) -> float:
         return shape + float(np.clip(x[2:].sum(), -0.5, 0.5))
