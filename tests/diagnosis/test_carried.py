@@ -89,6 +89,21 @@ def test_the_augmented_model_knows_it_in_that_log_alone_and_no_controller_suppli
     np.testing.assert_array_equal(augmented.feedforward(q, v, vdot), model.feedforward(q, v, vdot))
 
 
+def test_a_tool_that_was_taken_off_is_a_body_less(model: ReconstructedModel) -> None:
+    motion = motion_of(4, 30.0)
+    tau = torque(motion) - Payload().torque(Context(three_axis(), motion), LOAD)
+    found = diagnose(model, [measured(motion, tau, 4, 0.01)], jobs=1)
+    assert found.named == [("payload", None)] and found.unlisted is None
+    (added,) = found.outcome.added()
+    mass, com = (np.asarray(added.parameters[key].value) for key in ("mass", "com"))
+    assert abs(float(mass) + 0.4) < 0.005
+    np.testing.assert_allclose(com, LOAD["com"], atol=0.005)
+    assert "no longer a body that the model has, of 0.4" in added.effect.sentence(added.parameters)
+    # the augmented model is that of the bare arm
+    left = found.model.predict(motion) - tau
+    assert (np.sqrt((left[50:-50] ** 2).mean(axis=0)) < 0.1 * np.sqrt((tau**2).mean(axis=0))).all()
+
+
 def test_no_next_run_would_tell_more_of_what_was_carried(model: ReconstructedModel) -> None:
     assert next_run(diagnose(model, [run(1, TIMES)], jobs=1)) is None
 

@@ -165,7 +165,9 @@ def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
             if carried.sum() < 2 * X.shape[2]:
                 break
             beta, _, _ = solve(
-                Moments.of(X[carried].reshape(-1, X.shape[2]), y[carried].ravel()), [load], [X.shape[2]]
+                Moments.of(X[carried].reshape(-1, X.shape[2]), y[carried].ravel()),
+                [CarriedLoad()],
+                [X.shape[2]],
             )
             gains = 0.5 * (y**2 - (y - X @ beta) ** 2).sum(axis=1)
             before, carried = carried, _likeliest(gains, run)

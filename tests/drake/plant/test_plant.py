@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.joint_loads import ServoGains
-from armloop.drake.plant.plant import PAYLOAD_DENSITY, ArmPlant, _payload
+from armloop.drake.plant.plant import PAYLOAD_DENSITY, ArmPlant, _with_payload
 from armloop.robot.arm import load_arm
+from armloop.util.errors import ArmError
 
 FRICTION = JointFriction(static=1.3, coulomb=1.0, stribeck_velocity=0.1, viscous=2.0)
 KINDS = ("revolute", "continuous", "prismatic")
@@ -157,10 +159,23 @@ def test_a_payload_has_its_mass_at_its_centre_and_its_own_inertia_about_that():
         (0.05, 0.05),
         (None, 0.4 * 2.0 * (3 * 2.0 / (4 * np.pi * PAYLOAD_DENSITY)) ** (2 / 3)),
     ):
-        body = _payload(2.0, com, own)
+        body = _with_payload(SpatialInertia.Zero(), 2.0, com, own)
         assert body.get_mass() == pytest.approx(2.0)
         assert_allclose(body.get_com(), com)
         assert_allclose(
             body.CalcRotationalInertia().CopyToFullMatrix3(), about + inertia * np.eye(3), atol=1e-12
         )
-    assert _payload(0.0, com, 0.05).get_mass() == 0.0
+    assert _with_payload(SpatialInertia.Zero(), 0.0, com, 0.05).get_mass() == 0.0
+
+
+@pytest.mark.parametrize("own", [0.05, None])
+def test_what_is_taken_off_leaves_the_link_as_it_was_before(own):
+    link = SpatialInertia.SolidBoxWithMass(1.5, 0.1, 0.2, 0.4).Shift(np.array([0.0, 0.1, 0.0]))
+    com = np.array([0.1, -0.2, 0.3])
+    carrying = _with_payload(link, 2.0, com, own)
+    bare = _with_payload(carrying, -2.0, com, None if own is None else -own)
+    assert_allclose(bare.CopyToFullMatrix6(), link.CopyToFullMatrix6(), atol=1e-12)
+    with pytest.raises(ArmError, match=r"a payload of -1.5 kg leaves the last link with a mass of 0 kg"):
+        _with_payload(link, -1.5, com, own)
+    with pytest.raises(ArmError, match=r"without the 1 kg that were taken off, the last link is no body"):
+        _with_payload(link, -1.0, 10 * com, own)

@@ -11,6 +11,7 @@ from synthetic import fourier_motion
 
 from armloop.data.motion import Motion
 from armloop.laws.effects import Context, Estimate, effect
+from armloop.laws.effects.carried_load import CarriedLoad
 from armloop.laws.effects.gravity_tilt import unshown_axes
 from armloop.laws.effects.payload import Payload
 from armloop.regression.embedded import solve
@@ -101,10 +102,15 @@ def test_the_slope_of_the_payloads_constraint_is_that_of_finite_differences(seed
         np.testing.assert_allclose(J[:, k], slope, atol=1e-7)
 
 
-def test_a_payload_is_always_a_possible_body():
+@pytest.mark.parametrize("kind", [Payload, CarriedLoad])
+def test_a_payload_is_always_a_possible_body_or_one_that_was_taken_off(kind):
+    """What is carried at times is never taken off."""
     rng = np.random.default_rng(5)
     for x in rng.normal(size=(20, 5)):
-        beta, _ = Payload().embed(x)
+        beta, J = kind().embed(x)
+        assert (beta[0] < 0) == (x[0] < 0 and kind is Payload)
+        np.testing.assert_array_equal(kind().embed(np.array([x[0], *x[1:4], 0.0]))[1], J)
+        beta = beta * np.sign(beta[0])
         mass, moment = beta[0], beta[1:4]
         tensor = np.array(
             [[beta[4], beta[7], beta[8]], [beta[7], beta[5], beta[9]], [beta[8], beta[9], beta[6]]]

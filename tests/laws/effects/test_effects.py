@@ -325,7 +325,8 @@ def test_standard_errors_follow_from_the_covariance(name, context):
     ("name", "parameters", "possible"),
     [
         ("payload", {"mass": 0.5, "com": [0.05, 0, 0]}, True),
-        ("payload", {"mass": -0.5, "com": [0.05, 0, 0]}, False),
+        ("payload", {"mass": -0.5, "com": [0.05, 0, 0]}, True),  # a tool that was taken off
+        ("payload", {"mass": -0.5, "com": [2.0, 0, 0]}, False),
         ("payload", {"mass": 0.5, "com": [2.0, 0, 0]}, False),
         ("rotor_inertia", {"inertia": 0.1}, True),
         ("rotor_inertia", {"inertia": -0.1}, False),

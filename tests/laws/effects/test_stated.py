@@ -228,7 +228,7 @@ def test_a_torque_from_outside_is_one_number() -> None:
 
 def test_a_load_weighs_something() -> None:
     load = effect("payload", None)
-    for mass, possible in ((1e-9, True), (0.0, False)):
+    for mass, possible in ((1e-9, True), (0.0, False), (-1e-9, True)):
         found = {"mass": Estimate(mass, 0.0, "kg"), "com": Estimate([0.0] * 3, [0.0] * 3, "m")}
         assert load.plausible(an_arm(), found) is possible
 

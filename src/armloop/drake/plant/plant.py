@@ -166,7 +166,7 @@ class ArmPlant(Diagram):
         last = self.plant.GetBodyByName(f"link_{self.arm.n}")
         inertia = last.CalcSpatialInertiaInBodyFrame(context)
         for mass, com, own in more.payloads:
-            inertia += _payload(mass, com, own)
+            inertia = _with_payload(inertia, mass, com, own)
         last.SetSpatialInertiaInBodyFrame(context, inertia)
         damping = []
         for joint, viscous in zip(self.arm.joints, more.viscous, strict=True):
@@ -194,7 +194,7 @@ def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = Non
             raise ArmError(f"{arm.name}: link of {joint.name} has no possible inertia: {reason}") from error
         if effects is not None and i == arm.n - 1:
             for mass, com, own in effects.payloads:
-                inertia += _payload(mass, com, own)
+                inertia = _with_payload(inertia, mass, com, own)
         if i == arm.n - 1 and inertia.get_mass() <= 0:
             raise ArmError(f"{arm.name}: the last link has no mass; give it one to simulate the arm")
         body = plant.AddRigidBody(f"link_{i + 1}", instance, inertia)
@@ -218,11 +218,29 @@ def _spatial_inertia(mass: float, com: Array, inertia: Array) -> SpatialInertia:
     return SpatialInertia(mass, com, UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2]))
 
 
-def _payload(mass: float, com: Array, own: float | None) -> SpatialInertia:
-    """Return a payload's spatial inertia about the link frame's origin; a steel ball's where `own` is not known."""
-    if mass <= 0:
-        return SpatialInertia.Zero()
+def _with_payload(link: SpatialInertia, mass: float, com: Array, own: float | None) -> SpatialInertia:
+    """Return a link's spatial inertia about its frame's origin with a payload; a steel ball's where `own` is not known.
+
+    A negative mass takes a body off the link. Raises `ArmError` where the link is no body without it.
+    """
+    if mass == 0:
+        return link
     if own is None:
-        radius = np.cbrt(3.0 * mass / (4.0 * np.pi * PAYLOAD_DENSITY))
-        return SpatialInertia.SolidSphereWithMass(mass, radius).Shift(-com)
-    return SpatialInertia(mass, np.zeros(3), UnitInertia(*[own / mass] * 3)).Shift(-com)
+        radius = np.cbrt(3.0 * abs(mass) / (4.0 * np.pi * PAYLOAD_DENSITY))
+        own = 0.4 * mass * radius**2
+    total = link.get_mass() + mass
+    moment = link.CalcComMoment() + mass * com
+    tensor = link.CalcRotationalInertia().CopyToFullMatrix3()
+    tensor = tensor + mass * (float(com @ com) * np.eye(3) - np.outer(com, com)) + own * np.eye(3)
+    if total <= 0:
+        raise ArmError(f"a payload of {mass:g} kg leaves the last link with a mass of {total:g} kg")
+    G = tensor / total
+    try:
+        return SpatialInertia(
+            total, moment / total, UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])
+        )
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise ArmError(
+            f"without the {-mass:g} kg that were taken off, the last link is no body: {reason}"
+        ) from error

@@ -39,6 +39,7 @@ class CarriedLoad(Payload):
     name = "carried_load"
     role = "event"
     simulated = False
+    removable = False
     memory = True
 
     def __init__(

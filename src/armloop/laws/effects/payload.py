@@ -1,8 +1,9 @@
-"""Payload: a rigid body fixed to the last link, a load or a tool."""
+"""Payload: a rigid body fixed to the last link, a load or a tool; or one that has been taken off it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class Payload(Effect):
     body has five free ones: m, m c and one inertia about its own centre, equal in all directions; so a
     motion that hides some of the ten cannot turn them into an impossible body. ``com`` is given in the
     frame of the link ``tool`` if the URDF has one fixed to the last moving link, else in that link's frame.
+    What the model has and the arm has no longer, a tool that was taken off, has a negative mass and own inertia.
     """
 
     name = "payload"
@@ -47,18 +49,27 @@ class Payload(Effect):
     needs_model = False
     complexity = 5
     load = True
+    #: Whether the model may have had it, and the arm lacks it.
+    removable: ClassVar[bool] = True
+
+    def _mass(self, x: Array) -> tuple[float, float]:
+        """The mass, kg, never nothing, and its sign."""
+        mass = float(x[0])
+        sign = -1.0 if self.removable and mass < 0 else 1.0
+        return sign * max(sign * mass, 1e-3), sign
 
     def columns(self, context: Context, shape: float) -> Array:
         motion = context.motion
         return regressor(context.arm, motion.q, motion.v, motion.vdot, links=[context.arm.n - 1])
 
     def start(self, beta: Array) -> Array:
-        mass = max(float(beta[0]), 1e-3)
+        mass, _ = self._mass(beta)
         return np.array([mass, *beta[1:4], 1e-4 * mass])
 
     def embed(self, x: Array) -> tuple[Array, Array]:
         # Asked for thousands of times a diagnosis: plain floats are twenty times faster than small arrays.
-        mass, own = max(float(x[0]), 1e-3), max(float(x[4]), 0.0)
+        mass, sign = self._mass(x)
+        own = sign * max(sign * float(x[4]), 0.0)
         square, (a, b, c) = float(x[1:4] @ x[1:4]), x[1:4].tolist()
         point = [(square - a * a) / mass, (square - b * b) / mass, (square - c * c) / mass]
         point += [-a * b / mass, -a * c / mass, -b * c / mass]
@@ -88,7 +99,7 @@ class Payload(Effect):
         return np.stack([np.broadcast_to(x, motion.samples) for x in tau], axis=1)
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        mass = max(float(x[0]), 1e-3)
+        mass, sign = self._mass(x)
         com = x[1:4] / mass
         J = np.hstack([-com[:, None] / mass, np.eye(3) / mass])
         R, p = arm.X_tool[:3, :3], arm.X_tool[:3, 3]
@@ -97,13 +108,13 @@ class Payload(Effect):
         return {
             "mass": Estimate(mass, mass_error, "kg"),
             "com": Estimate(_within(R.T @ (com - p), errors, reach(arm)).tolist(), errors.tolist(), "m"),
-            "own_inertia": Estimate(max(float(x[4]), 0.0), own_error, "kg*m^2"),
+            "own_inertia": Estimate(sign * max(sign * float(x[4]), 0.0) + 0.0, own_error, "kg*m^2"),
         }
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
-        # A body has a mass, and its centre lies where something bolted to the flange can reach.
+        # The centre of a body lies where something bolted to the flange can reach.
         mass, com = number(parameters["mass"].value), np.asarray(parameters["com"].value)
-        return mass > 0 and float(np.linalg.norm(com)) < reach(arm)
+        return (mass > 0 or (self.removable and mass < 0)) and float(np.linalg.norm(com)) < reach(arm)
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         mass, com = parameters["mass"], parameters["com"]
@@ -148,8 +159,10 @@ def _within(com: Array, errors: Array, farthest: float) -> Array:
 
 def on_the_last_link(mass: Estimate, centre: str) -> str:
     """A body in words; the words know no arm, so they say by which rule its link is chosen."""
+    kilograms = number(mass.value)
+    what = "a body" if kilograms > 0 else "no longer a body that the model has,"
     return (
-        f"a body of {number(mass.value):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({centre}) m "
+        f"{what} of {abs(kilograms):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({centre}) m "
         "in the frame of the link tool (of the last moving link if the URDF has no tool)"
     )
 
