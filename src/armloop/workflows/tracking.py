@@ -129,7 +129,8 @@ def save_made(
 def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
     """The content of ``tracking.json``: η and other metrics per joint and controller, and the loop's margins at rest."""
     plant, q0 = scenario.plant, scenario.reference.evaluate([0.0])[0][0]
-    sampled = SampledArm.of(posture_model(plant.arm, plant.config.friction, q0), plant.config.time_step)
+    linear = posture_model(plant.arm, plant.config.friction, q0, scenario.effects)
+    sampled = SampledArm.of(linear, plant.config.time_step)
     return {
         **heading(scenario, next(iter(results.values())).unit),
         "settling_band": BAND,

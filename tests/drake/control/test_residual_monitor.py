@@ -73,6 +73,8 @@ def test_a_block_is_handed_on_as_it_was_sampled(model, monkeypatch) -> None:
     ((motion, tau, slides),) = handed
     assert_allclose(motion.time, 3.0 + 0.1 * np.arange(10))
     assert motion.starts.tolist() == [0]
+    # what warms up has done so since time 0
+    assert motion.elapsed.tolist() == motion.time.tolist()
     assert_allclose(np.hstack([tau, motion.q, motion.v, motion.vdot]), rows)
     assert np.argwhere(~slides).tolist() == [[3, 0], [3, 1], [3, 2]]
 

@@ -8,6 +8,8 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from armloop.drake.control.pid import PidGains
+from armloop.drake.plant.exact import exact_model
+from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.tuning.loop_analysis import (
     SampledArm,
@@ -101,6 +103,22 @@ def test_friction_of_an_identified_model_is_linearised_by_its_derivative():
     truth = posture_model(arm, [JointFriction()] * 3, [0.1, 0.3, -0.5])
     assert_allclose(M, truth[0], atol=1e-9)
     assert_allclose(G, truth[2], atol=1e-4)
+
+
+def test_what_the_simulated_arm_has_too_counts():
+    arm, q0 = load_arm("three_axis"), [0.1, 0.3, -0.5]
+    friction = [JointFriction(viscous=0.5)] * 3
+    effects = [
+        UndeclaredEffect("payload", None, {"mass": 2.0, "com": [0.05, 0.0, 0.02], "own_inertia": 0.003}),
+        UndeclaredEffect("viscous_friction", 1, {"coefficient": 3.0}),
+        UndeclaredEffect("rotor_inertia", 2, {"inertia": 0.2}),
+    ]
+    bare, found = (posture_model(arm, friction, q0, given) for given in ((), effects))
+    knowing = model_posture(exact_model(arm, friction, effects), q0)
+    for own, theirs in zip(found, knowing, strict=True):
+        assert_allclose(own, theirs, atol=1e-4)
+    assert found[1][0, 0] == pytest.approx(bare[1][0, 0] + 3.0)
+    assert np.abs(found[0] - bare[0]).max() > 0.2 and np.abs(found[2] - bare[2]).max() > 1.0
 
 
 def test_friction_of_a_sliding_joint_is_linearised_at_a_tenth_of_a_metre_per_second():

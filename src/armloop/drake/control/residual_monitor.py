@@ -99,7 +99,9 @@ class ResidualMonitor(LeafSystem):
         tau, q, v, vdot = (rows[:, k * n : (k + 1) * n] for k in range(4))
         time = context.get_time() + self._period * np.arange(-float(self._count), 0.0)
         slides = np.abs(v) > self._slides
-        _, block = block_sums(self._model, Motion(time, q, v, vdot), tau, slides)
+        # what warms up has done so since time 0, not since this block began
+        motion = Motion(time, q, v, vdot, np.array([0]), np.array([0.0]))
+        _, block = block_sums(self._model, motion, tau, slides)
         following = advance(self._model, self._columns, self._memory(context), block, self._learn)
         state.get_mutable_abstract_state(int(self._watch)).set_value(following)
 

@@ -20,6 +20,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.primitives import Linearize
 
 from armloop.drake.control.pid import PidGains
+from armloop.drake.plant.fault_injection import Effects, realise
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.plant import add_links
 from armloop.drake.scalars import functions_of
@@ -52,12 +53,18 @@ class LoopMargins:
     sensitivity_peak: float
 
 
-def posture_model(arm: Arm, friction: Sequence[JointFriction], q0: ArrayLike) -> tuple[Array, Array, Array]:
-    """Return M, F, G (n, n) of the arm linearised at rest at q0 (n,) by Drake's `Linearize`."""
+def posture_model(
+    arm: Arm, friction: Sequence[JointFriction], q0: ArrayLike, effects: Effects = ()
+) -> tuple[Array, Array, Array]:
+    """Return M, F, G (n, n) of the arm linearised at rest at q0 (n,) by Drake's `Linearize`.
+
+    effects : that it has, too; of these payloads, rotors, a tilt and viscous friction count
+    """
+    has = realise(arm, effects)
     plant = MultibodyPlant(0.0)
-    add_links(plant, arm)
-    for joint, f in zip(arm.joints, friction, strict=True):
-        plant.GetJointByName(joint.name).set_default_damping(f.viscous)
+    add_links(plant, arm, has)
+    for joint, f, more in zip(arm.joints, friction, has.viscous, strict=True):
+        plant.GetJointByName(joint.name).set_default_damping(f.viscous + more)
     plant.Finalize()
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, np.asarray(q0, dtype=float))
@@ -66,7 +73,7 @@ def posture_model(arm: Arm, friction: Sequence[JointFriction], q0: ArrayLike) ->
     torque.FixValue(context, -plant.CalcGravityGeneralizedForces(context))
     linear = Linearize(plant, context, torque.get_index(), plant.get_state_output_port().get_index())
     M = np.linalg.inv(linear.B()[n:])
-    return M, -M @ linear.A()[n:, n:], -M @ linear.A()[n:, :n]
+    return M + np.diag(has.rotor_inertia), -M @ linear.A()[n:, n:], -M @ linear.A()[n:, :n]
 
 
 def model_posture(model: ReconstructedModel, q0: ArrayLike) -> tuple[Array, Array, Array]:
