@@ -60,7 +60,7 @@ $(TESTING): requirements-test.lock $(INSTALLED)
 loop: setup
 	$(BIN)/armloop loop --out out/loop
 
-# With the packages of the documentation, whose site a test builds.
+# With the packages of the documentation, whose site a long test builds.
 test: types $(WRITING)
 	$(BIN)/pytest $(PYTEST_ARGS) -m "not long"
 

@@ -13,7 +13,7 @@ import pytest  # noqa: E402
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 MEASURED = REPOSITORY.parent / "shared" / "data"
-#: The files that take longest, first every command of the README and the site with its tutorials executed.
+#: The files that take longest, first every command of the README.
 LONGEST = ("fresh/test_readme.py", "diagnosis/test_diagnosis.py", "measured/test_ur10e.py")
 
 

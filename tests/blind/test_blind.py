@@ -61,7 +61,7 @@ def test_no_false_alarms(cases: dict[str, Case]) -> None:
     assert all(verdict["verdict"] == "no_effect" for verdict in clean)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_creep_into_points_is_no_friction_that_came(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A clean run that goes from point to point, and a model of sines and sweeps, of an arm from an engine of its own."""
     pytest.importorskip("mujoco", reason="mujoco is needed for tests only; it is in requirements-test.lock")

@@ -14,8 +14,8 @@ from synthetic import measured, three_axis
 
 from armloop.data.log import MotionLog
 from armloop.data.signals import preprocess
+from armloop.diagnosis import Diagnosis, diagnose
 from armloop.diagnosis import carried as carrying
-from armloop.diagnosis import diagnose
 from armloop.diagnosis.account import best_account
 from armloop.diagnosis.carried import account_with_load, find_carried
 from armloop.diagnosis.evidence import Evidence
@@ -48,6 +48,12 @@ def model() -> ReconstructedModel:
     return model_with_baseline()
 
 
+@pytest.fixture(scope="module")
+def carried(model: ReconstructedModel) -> Diagnosis:
+    """What is found of a run in which the load comes and goes."""
+    return diagnose(model, [run(1, TIMES)], jobs=1)
+
+
 def evidence(model: ReconstructedModel, *logs: MotionLog) -> Evidence:
     return Evidence.of(model, preprocess(list(logs), model.conditioning), hypotheses(model.arm))
 
@@ -75,10 +81,10 @@ def test_a_load_carried_at_times_is_found_with_its_mass_and_when(
 
 
 def test_the_augmented_model_knows_it_in_that_log_alone_and_no_controller_supplies_it(
-    model: ReconstructedModel,
+    model: ReconstructedModel, carried: Diagnosis
 ) -> None:
     log, other = run(1, TIMES), run(2, [])
-    augmented = diagnose(model, [log], jobs=1).model
+    augmented = carried.model
     motions = [preprocess([one], model.conditioning).motion for one in (log, other)]
     added = [augmented.predict(motion) - model.predict(motion) for motion in motions]
     inside = np.logical_or.reduce(
@@ -104,11 +110,12 @@ def test_a_tool_that_was_taken_off_is_a_body_less(model: ReconstructedModel) -> 
     assert (np.sqrt((left[50:-50] ** 2).mean(axis=0)) < 0.1 * np.sqrt((tau**2).mean(axis=0))).all()
 
 
-def test_no_next_run_would_tell_more_of_what_was_carried(model: ReconstructedModel) -> None:
-    assert next_run(diagnose(model, [run(1, TIMES)], jobs=1)) is None
+def test_no_next_run_would_tell_more_of_what_was_carried(carried: Diagnosis) -> None:
+    assert next_run(carried) is None
 
 
-@pytest.mark.parametrize(("seed", "level"), [(4, 0.5), pytest.param(6, 1.5, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "level"), [(4, 0.5), (6, 1.5)])
 def test_what_is_beside_a_load_is_found_too(model: ReconstructedModel, seed: int, level: float) -> None:
     """The load that is found first has soaked up some of it, and seems to be there at other times."""
     log, motion = run(seed, TIMES), motion_of(seed, 30.0)

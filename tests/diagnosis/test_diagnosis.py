@@ -442,6 +442,7 @@ def test_a_reconstructed_model_serves_as_well_as_an_exact_one() -> None:
     assert (clean["verdict"], clean["effects"]) == ("no_effect", [])
 
 
+@pytest.mark.long
 def test_an_effect_must_exceed_what_the_model_leaves_on_the_worst_of_its_baseline(
     model: ReconstructedModel,
 ) -> None:

@@ -101,7 +101,8 @@ def test_a_fold_is_judged_with_what_the_other_folds_showed_alone():
         np.testing.assert_allclose(found.held_out[rows], left, rtol=1e-3)
 
 
-@pytest.mark.parametrize("mass", [0.1, pytest.param(0.3, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("mass", [0.1, 0.3])
 def test_a_load_on_an_upright_slide_is_no_torque_offset(mass):
     # On the SCARA arm a load is almost only a constant force on the slide; its inertia tells it apart.
     model = exact("scara")

@@ -75,6 +75,7 @@ def test_memory_that_the_training_logs_do_not_show_has_come_since() -> None:
     assert "all along" not in " ".join(findings(diagnosis))
 
 
+@pytest.mark.long
 def test_of_joints_that_never_turned_round_in_the_training_logs_nothing_is_said_there() -> None:
     model = coulomb_and_viscous(run(90, memory=True))
     known = [*model.baseline["reversals"][:2], None]

@@ -86,7 +86,7 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     (("effects", 0, "joint"), [2, 99, "1", 1.5], r"joint"),
     (("effects", 1, "joint"), [None, 0, -1, 4, 10**30, "2", ...], "joint"),
     ((*PAYLOAD, "mass"), [None, 0.4, [], ...], "mass"),
-    ((*PAYLOAD, "mass", "value"), [-0.4, 0.0, "x", None, 1e300, [], ...], "mass|payload"),
+    ((*PAYLOAD, "mass", "value"), [0.0, "x", None, 1e300, [], ...], "mass|payload"),
     ((*PAYLOAD, "mass", "std_error"), [-0.1, "x", {}, 1e300, ...], "std_error"),
     ((*PAYLOAD, "mass", "unit"), [None, 3, ...], "unit"),
     (

@@ -99,7 +99,7 @@ SHORTER = {
 SHORT = "plant: three_axis\nreference: {kind: fourier, duration: 5.0}\nscore: [1.0, 5.0]\n"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_site_is_built_strictly_with_its_tutorials_executed(done, installed, tmp_path):
     if shutil.which("mkdocs", path=BIN) is None:
         pytest.skip("the packages of requirements-docs.lock are not installed (`make docs` installs them)")

@@ -336,7 +336,8 @@ def pruned(evidence: Evidence, outcome: Outcome) -> Outcome:
 
 
 def clear(evidence: Evidence, outcome: Outcome, settled: int = 0, alike: bool = False) -> Outcome:
-    """The outcome without effects no coefficient of which is significant by its stated error (Wald test), the least first.
+    """The outcome without effects of which no coefficient is significant by its stated error, nor are all together
+    (Wald tests), the least first.
 
     What a model gets wrong comes back with the motion, on held-out blocks too; the errors count that. An effect
     whose parameters are impossible beside those found later is not significant: no model file may hold it.

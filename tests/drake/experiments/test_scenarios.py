@@ -202,6 +202,15 @@ def test_a_reference_from_a_file(tmp_path):
         ),
         ("[1, 2]\n", "must be a mapping"),
         ("plant: [\n", "unreadable YAML"),
+        (
+            OWN + "effects: [{effect: transmission_coupling, joint: 2, other_joint: 2, parameters: "
+            "{inertia: 0.0, viscous: 0.1, coulomb: 0.1, ratio: 1.0}}]\n",
+            "effects: effect 'transmission_coupling': joint and other_joint must differ, both are 2",
+        ),
+        (
+            OWN + "reference: {places: [[0, 0, 0], [0.1, 0.1, 0.1]]}\n",
+            "reference.places belongs to kind: places; this reference is of kind paper",
+        ),
     ],
 )
 def test_faults_are_told_in_one_line(tmp_path, text, message):

@@ -236,7 +236,7 @@ class TestSearch:
             return np.ones((1, 1, 2))
 
         for one in effects:
-            one.full_columns = partial(columns, one.place[0])
+            one.fixed_columns = partial(columns, one.place[0])
 
         def bench(laws: Any) -> Any:
             taken = [law.effect.place[0] for law in laws]
@@ -294,7 +294,7 @@ class TestSearch:
         peaks = {0: [7.0, 4.0], 1: [50.0], 2: []}
         asked, judged = [], [0.0]
 
-        made[0].full_columns = lambda context, shape: np.full((1, 1, 2), shape)
+        made[0].fixed_columns = lambda context, shape: np.full((1, 1, 2), shape)
         motion = SimpleNamespace(q=np.arange(6.0).reshape(3, 2))
         samples: Any = SimpleNamespace(motion=motion, period=0.1)
 
@@ -306,7 +306,7 @@ class TestSearch:
 
             def left(joint: int) -> Any:
                 assert joint == 1
-                return np.array([0, 2]), np.array([len(laws) + 0.0, 9.0])
+                return np.array([0, 2]), np.array([len(laws) + 0.0, 9.0]), np.array([0, 1])
 
             return SimpleNamespace(trial=trial, left=left)
 
@@ -318,6 +318,7 @@ class TestSearch:
         monkeypatch.setattr(catalogue, "Context", lambda arm, motion, period: SimpleNamespace(motion=motion))
         monkeypatch.setattr(catalogue, "_smoothed", lambda samples, columns: columns)
         monkeypatch.setattr(catalogue, "lines", lines)
+        monkeypatch.setattr(catalogue, "between", lambda q, left, peak, blocks: peak + 0.1 * (blocks - 2))
         nothing: Any = None
         # Student's t of eight degrees of freedom: 8.906 in a hundred thousand cases, 4.501 in a thousand
         for score, found in ((8.91, [(6.0, 100), (50.0, 100)]), (8.90, [])):

@@ -30,7 +30,7 @@ def effect(inertias: Any, **of: Any) -> Any:
         return shape * (torque + 5.0 + motion.q[:, :, None])
 
     flags = {"needs_model": False, "memory": False, "load": False} | of
-    return SimpleNamespace(full_columns=columns, **flags)
+    return SimpleNamespace(fixed_columns=columns, **flags)
 
 
 def test_the_mass_matrix_is_what_an_acceleration_of_one_adds() -> None:

@@ -202,7 +202,7 @@ class TestCatalogue:
         laws = []
         for size in (1, 2, 1):
             law = self.law(size)
-            law.effect.full_columns = lambda context, shape, size=size: np.full((5, 3, size), float(size))  # type: ignore[attr-defined]
+            law.effect.fixed_columns = lambda context, shape, size=size: np.full((5, 3, size), float(size))  # type: ignore[attr-defined]
             law.effect.estimates = lambda arm, x, covariance, shape: (x.tolist(), covariance.tolist())  # type: ignore[attr-defined]
             laws.append(law)
         several, nothing = catalogue.Laws(laws), catalogue.Laws()

@@ -71,7 +71,7 @@ def test_the_lowest_order_is_tried_however_many_candidates_are_allowed(samples):
     assert [report.orders for report in found.reports] == [[1, 2]]
 
 
-def test_more_candidates_than_samples_are_refused(samples, monkeypatch):
-    monkeypatch.setattr("armloop.identification.reconstruction.sindy._MOST_SAMPLES", 100)
+def test_more_candidates_than_can_be_given_are_refused(samples, monkeypatch):
+    monkeypatch.setattr("armloop.identification.reconstruction.sindy._MOST_CANDIDATES", 100)
     with pytest.raises(InputError, match=r"one-shot regression of 3 joints has .* use --method stepwise"):
         sindy(three_axis(), samples, folds(samples, 5, 1.0) == 0, Options(), silent)

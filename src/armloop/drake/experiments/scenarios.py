@@ -37,7 +37,7 @@ from armloop.schemas.scenarios import (
     TrackingData,
 )
 from armloop.util.doubts import warn
-from armloop.util.errors import ArmError, ScenarioError
+from armloop.util.errors import ArmError, ModelError, ScenarioError
 from armloop.util.given import path_of
 from armloop.util.resources import scenario_path, urdf_names, urdf_path
 
@@ -215,7 +215,7 @@ def _effects(data: list[PlantEffectData], arm: Arm, where: str) -> tuple[Undecla
     try:
         effects = tuple(UndeclaredEffect(e.effect, e.joint, e.parameters, e.other_joint) for e in data)
         realise(arm, effects)
-    except ScenarioError as error:
+    except (ModelError, ScenarioError) as error:
         raise ScenarioError(f"{where}: effects: {error}") from error
     return effects
 

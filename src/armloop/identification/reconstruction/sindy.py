@@ -28,6 +28,8 @@ from armloop.util.progress import Progress
 _SETTINGS = [(threshold, ridge) for ridge in (1e-4, 1e-2) for threshold in (3e-3, 1e-2, 3e-2)]
 #: pysindy holds the library and its normal equations several times over: 4,000 rows keep it in memory.
 _MOST_SAMPLES = 4000
+#: Of the lowest order, whatever the options allow of others.
+_MOST_CANDIDATES = 4000
 _FEWEST_SAMPLES = 100
 
 
@@ -55,8 +57,7 @@ def sindy(arm: Arm, samples: Samples, held_out: Mask, options: Options, progress
     best: tuple[float, DoubleFeatureSet, Array] | None = None
     for N1 in range(1, options.max_order + 1):
         library = DoubleFeatureSet(revolute, N1, 2, "both")
-        # of the lowest order as many as there may be samples
-        if library.size > (options.max_candidates if N1 > 1 else _MOST_SAMPLES):
+        if library.size > (options.max_candidates if N1 > 1 else _MOST_CANDIDATES):
             break
         progress(f"sindy: {library.size} candidates of order ({N1}, 2)")
         X, signs = library.columns(samples.motion.take(rows)), np.sign(samples.motion.v[rows])
@@ -74,7 +75,7 @@ def sindy(arm: Arm, samples: Samples, held_out: Mask, options: Options, progress
     if best is None:
         raise InputError(
             f"one-shot regression of {arm.n} joints has {library.size} candidates at its lowest order, more than the "
-            f"{_MOST_SAMPLES} samples it is given; use --method stepwise, whose libraries scale"
+            f"{_MOST_CANDIDATES} that it can be given; use --method stepwise, whose libraries scale"
         )
     _, library, coefficients = best
     full = DoubleFeatureSet(revolute, library.N1, 2, "both", independent=False).size
