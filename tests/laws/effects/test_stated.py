@@ -381,3 +381,33 @@ def test_friction_is_dry_that_turns_with_the_direction_whatever_the_speed() -> N
     dry = {kind for kind, element in KINDS.items() if element.dry}
     assert {"sign", "smooth_sign", "stribeck_peak", "load_sign", "fading_sign", "hysteresis"} <= dry
     assert not dry & {"viscous", "quadratic", "cubic", "root", "offset", "both_ways", "viscous_forward"}
+
+
+def test_a_ripple_between_whole_orders_is_one_whose_order_is_changed_a_little() -> None:
+    """By its derivative; a whole one has a sine and a cosine alone."""
+    ripple = effect("torque_ripple", 2)
+    q = np.zeros((200, 3))
+    q[:, 1] = np.linspace(-1.0, 2.0, 200)
+    context = Context(an_arm(), Motion(0.01 * np.arange(200), q, 0 * q, 0 * q, np.array([0])))
+    assert ripple.columns(context, 10.0).shape == (200, 2)
+    columns, x = ripple.columns(context, 10.4), np.array([0.3, -0.5, 1e-4])
+    beta, J = ripple.embed(x)
+    np.testing.assert_allclose(ripple.start(beta), x)
+    for k, h in enumerate(1e-6 * np.eye(3)):
+        slope = (ripple.embed(x + h)[0] - ripple.embed(x - h)[0]) / 2e-6
+        np.testing.assert_allclose(J[:, k], slope, atol=1e-9)
+    found = ripple.estimates(context.arm, x, np.diag([1e-4, 1e-4, 4e-6]), 10.4)
+    assert (found["order"].value, found["order"].std_error) == (
+        pytest.approx(10.4001),
+        pytest.approx(2e-3, rel=1e-3),
+    )
+    torque = ripple.torque(context, {key: e.value for key, e in found.items()})[:, 1]
+    # to second order in what the phase changes by at the ends: (2 rad · 1e-4)²
+    np.testing.assert_allclose(columns @ beta, torque, atol=1e-7)
+    assert np.abs(columns[:, :2] @ x[:2] - torque).max() > 1e-5
+    assert ripple.refined(x, 10.4) == pytest.approx(10.4001)
+    np.testing.assert_array_equal(ripple.fixed_columns(context, 10.4)[:, 1], columns[:, :2])
+    # at an order that stays as it is nobody asks by how much it is off
+    fixed = ripple.estimates(context.arm, x[:2], 1e-4 * np.eye(2), 10.4)
+    assert np.isnan(fixed["order"].std_error) and np.isnan(fixed["phase"].std_error)
+    assert ripple.estimates(context.arm, x[:2], 1e-4 * np.eye(2), 10.0)["order"].std_error == 0.0
