@@ -9,7 +9,9 @@ from armloop.data.motion import Motion
 from armloop.drake.experiments.pickup import PHASES, run_pickup
 from armloop.drake.experiments.scenarios import Pickup, load_tracking
 from armloop.drake.plant.exact import exact_model
-from armloop.util.errors import ScenarioError
+from armloop.util.errors import InputError, ScenarioError
+from armloop.util.progress import silent
+from armloop.workflows.pickup import run_pickup_scenario
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +74,16 @@ def test_a_grasp_between_two_samples_loses_none(run):
     np.testing.assert_allclose(np.diff(whole.time), 1e-3, atol=1e-9)
     # the reference beside it is that of the same instants
     np.testing.assert_allclose(found["augmented"].eta, run[3].phases["augmented"].eta, rtol=0.2)
+
+
+def test_a_model_that_it_would_not_run_with_is_told(run):
+    scenario, ignorant, *_ = run
+    with pytest.raises(
+        InputError, match=r"run with one named step3 or model; nothing would run with foo, bar"
+    ):
+        run_pickup_scenario(scenario, {"model": ignorant, "foo": ignorant, "bar": ignorant}, None, silent)
+    with pytest.raises(InputError, match="needs a model named step3 or model"):
+        run_pickup_scenario(scenario, {"foo": ignorant}, None, silent)
 
 
 def test_what_is_wrong_with_a_pickup_is_told(tmp_path):
