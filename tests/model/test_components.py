@@ -26,6 +26,19 @@ def test_a_rigid_body_is_its_regressor_times_its_parameters(name: str, rotors: b
         np.testing.assert_allclose(body.torque(arm, motion, step), expected, rtol=1e-12, atol=1e-12)
 
 
+def test_links_of_eleven_joints_are_no_rotors_of_ten() -> None:
+    """Both have 110 parameters; the arm says which they are."""
+    arm: Any = SimpleNamespace(n=11)
+    body = RigidBody(np.zeros(110), ("m11", "J3"), np.array([1.0, 0.5]))
+    assert body.rotors(11).tolist() == [0.0, 0.0, 0.5, *[0.0] * 8]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            "armloop.model.components.joint_torques", lambda arm, links, q, v, vdot: links.sum() + q
+        )
+        motion = Motion(np.arange(4.0), *np.ones((3, 4, 11)))
+        np.testing.assert_array_equal(body.torque(arm, motion, 3), np.ones((4, 11)))
+
+
 def test_what_a_bound_holds_at_zero_is_not_printed() -> None:
     arm = load_arm("three_axis")
     body = RigidBody(np.zeros(33), ("mx2 + 0.4 m3", "J2"), np.array([0.0, 0.5]))

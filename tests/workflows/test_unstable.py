@@ -11,6 +11,7 @@ from answers import answered
 
 from armloop.drake.control.pid import PidGains
 from armloop.drake.experiments.scenarios import TrackingScenario, load_tracking
+from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.reports.tuning_tables import verified_table
 from armloop.util.errors import InputWarning
 from armloop.util.progress import silent
@@ -46,3 +47,14 @@ def test_a_tuning_states_no_margin_of_it(tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     # one card states margins, that of the proposed gains
     assert page.count("least phase margin along the reference") == 1
+
+
+def test_margins_are_those_of_the_arm_that_is_simulated() -> None:
+    """With a load that halves the bandwidth of the joints that carry it."""
+    usual = load_tracking("three_axis_tracking")
+    short = replace(usual.reference, duration=1.0)
+    bare = replace(usual, controllers=("pid",), reference=short, score=(0.1, 1.0))
+    load = UndeclaredEffect("payload", None, {"mass": 8.0, "com": [0.05, 0.0, 0.0]})
+    answers = [run_scenario(each, {}, None, silent)[0] for each in (bare, replace(bare, effects=(load,)))]
+    without, carrying = ([loop["bandwidth_rad_s"] for loop in answer["loop"]] for answer in answers)
+    assert carrying[1] < 0.5 * without[1] and carrying[2] < 0.5 * without[2]
