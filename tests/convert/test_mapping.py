@@ -230,3 +230,5 @@ def test_what_a_source_says_of_tau_is_not_overruled(tmp_path, capsys):
     assert f"--drive-gains, but the table {said} N*m" in refused(
         [*table("N*m", 1.0), "--drive-gains", "2,3,4"], capsys
     )
+    assert main([*table("%", 100.0), "--drive-gains", "2,3,4"]) == 0
+    np.testing.assert_allclose(torques(), 100.0 * q * [2, 3, 4], atol=1e-6)

@@ -15,7 +15,7 @@ from armloop.data.filters import filter_reach
 from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import InputError
 
-#: So many seconds without a record, a drive is as cold as at first.
+#: A clock that goes on for so many seconds without a record is another log's: its drive is as cold as at first.
 _ANOTHER = 3600.0
 
 
@@ -121,8 +121,8 @@ class Motion:
     def elapsed(self) -> Array:
         """(N,) seconds since the record of each sample's log began.
 
-        Runs whose clock goes on belong to one log; a clock that goes back is another's, and so is one that has gone on for
-        an hour, where all logs are stamped by the same.
+        Runs whose clock goes on belong to one log; a clock that goes back is another's. Where one clock stamps all logs,
+        another begins after an hour without a record.
         """
         steps = self.time[self.starts[1:]] - self.time[self.starts[1:] - 1]
         first = np.concatenate([[True], (steps <= 0) | (steps > _ANOTHER)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from armloop.data.log import read_log, write_log
+from armloop.data.log import MotionLog, read_log, write_log
 from armloop.drake.experiments import collection
 from armloop.drake.experiments.collection import collect, measure_run
 from armloop.drake.experiments.recording import Recording, as_log
@@ -20,7 +20,7 @@ from armloop.experiment.design import Limits, Series, nominal_torque
 from armloop.experiment.excitation import fourier_reference
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor
-from armloop.util.errors import InputWarning
+from armloop.util.errors import InputWarning, LogError
 from armloop.util.resources import urdf_path
 
 TINY = msgspec.structs.replace(
@@ -254,3 +254,14 @@ class TestPieces:
         tau = np.repeat([3.0, 4.0], 5)[:, None] + noise
         assert np.array_equal(log.tau, np.round(tau, 6))
         assert np.array_equal(log.q[:5], np.round(q, 9)) and np.array_equal(log.v[:5], np.round(q, 7))
+
+    def test_what_an_unstable_loop_did_is_recorded_though_nobody_would_believe_the_measurement(self):
+        time = np.arange(200) * 0.01
+        q = np.sin(time)[:, None]
+        tau = np.cos(time)[:, None]
+        tau[100] = -95.0
+        with pytest.raises(LogError, match="spike"):
+            MotionLog(time, q, np.cos(time)[:, None], tau)
+        run = Recording(time, q, np.cos(time)[:, None], tau)
+        log = as_log("run", [run], Instruments(torque_noise=0.0), np.random.default_rng(1))
+        assert log.tau[100, 0] == -95.0 and log.samples == 200 and log.v_derived is False

@@ -64,8 +64,8 @@ def as_log(
         now = float(time[-1][-1]) + 20 * period
     q, v, tau = (np.concatenate([getattr(r, key) for r in recordings]) for key in ("q", "v", "tau"))
     tau = instruments.sense(tau, rng)
-    # No more digits than the instruments have: the files stay small. What a loop does that is not stable no recorder would
-    # be believed, and happened here nevertheless.
+    # No more digits than the instruments have: the files stay small. Not checked as a measurement is: an unstable loop does
+    # what no arm can have done.
     return unchecked_log(
         time=np.concatenate(time).round(6),
         q=np.round(q, 9),
