@@ -21,7 +21,8 @@ TESTING := $(VENV)/.testing
 WRITING := $(VENV)/.writing
 # The wheel and the environment that it is installed in; a folder outside the checkout will do as well.
 WHEEL ?= out/wheel
-PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
+# A process that crashes ends the run: xdist deals its files again, and may then wait for ever (pytest-xdist#1378).
+PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 .PHONY: setup loop test types long docs wheel bench blind mutants clean
 
@@ -60,9 +61,9 @@ $(TESTING): requirements-test.lock $(INSTALLED)
 loop: setup
 	$(BIN)/armloop loop --out out/loop
 
-# With the packages of the documentation, whose site a long test builds.
+# With the packages of the documentation, whose site a long test builds. A test that hangs ends the run, and says where.
 test: types $(WRITING)
-	$(BIN)/pytest $(PYTEST_ARGS) -m "not long"
+	$(BIN)/pytest $(PYTEST_ARGS) -o faulthandler_timeout=400 -o faulthandler_exit_on_timeout=true -m "not long"
 
 types: setup $(TESTING)
 	$(BIN)/ruff check .

@@ -238,13 +238,16 @@ def velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
     return np.maximum(rough, rounding * np.sqrt(min(1.0, 2 * cutoff_hz * period)))
 
 
-def smooth(samples: Samples, x: Array) -> Array:
+def smooth(samples: Samples, x: Array, runs: Sequence[slice] | None = None) -> Array:
     """Pass x (N, ...) through the filter that the samples' torque has passed, run by run.
 
     Whatever is computed of the motion must lose what the measured torque has lost before the two are compared.
+
+    Args:
+        runs: those of the samples' runs to treat; all by default.
     """
-    for period, runs in _rates(samples).items():
-        x = LowPass(samples.cutoff_hz, period).each(x, runs)
+    for period, alike in _rates(samples, runs).items():
+        x = LowPass(samples.cutoff_hz, period).each(x, alike)
     return x
 
 
@@ -282,10 +285,10 @@ def independent_rows(samples: Samples) -> Mask:
     return rows
 
 
-def _rates(samples: Samples) -> dict[float, list[slice]]:
+def _rates(samples: Samples, runs: Sequence[slice] | None = None) -> dict[float, list[slice]]:
     """The runs by sample period, s: that of the samples for all that have it but for the rounding of their stamps."""
     rates: dict[float, list[slice]] = {}
-    for run in samples.motion.runs():
+    for run in samples.motion.runs() if runs is None else runs:
         own = _period(samples.motion.time[run])
         rates.setdefault(own if own and _differ(own, samples.period) else samples.period, []).append(run)
     return rates

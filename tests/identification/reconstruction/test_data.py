@@ -14,7 +14,7 @@ from synthetic import LOWER, UPPER, fourier_motion, friction, measured, rigid_to
 from armloop.data.log import MotionLog, write_log
 from armloop.data.pieces import log_sources
 from armloop.data.regimes.indicators import size
-from armloop.data.signals import Conditioning, ShortRunError, as_torque, preprocess
+from armloop.data.signals import Conditioning, ShortRunError, as_torque, preprocess, smooth
 from armloop.experiment.excitation import MotionRanges
 from armloop.experiment.sampling import inverse_dynamics_samples
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
@@ -28,8 +28,8 @@ from armloop.util.workers import Processes, Serial, Workers
 OPTIONS = Options(max_order=1, sparse=Sparse("thresholded"))
 
 
-def a_run(seed: int, seconds: float = 10.0) -> MotionLog:
-    motion = fourier_motion(seconds, 125.0, seed)
+def a_run(seed: int, seconds: float = 10.0, rate: float = 125.0) -> MotionLog:
+    motion = fourier_motion(seconds, rate, seed)
     tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
     return measured(motion, tau, seed, name=f"run{seed}")
 
@@ -245,3 +245,18 @@ def test_unsorted_samples_take_the_condition_of_their_neighbours(logs: list[Moti
     learnt = Sorter(half.samples, labels[::2])
     assert (learnt(samples)[::2] == labels[::2]).all()
     assert (learnt(samples) == labels).mean() > 0.97  # all but those near a border
+
+
+def test_logs_of_several_rates_are_filtered_each_at_its_own_and_count_alike_in_any_order() -> None:
+    logs = [a_run(1, rate=60.0), a_run(2, 8.0, rate=400.0)]
+    seconds, how = [], Conditioning()
+    for order in (logs, logs[::-1]):
+        data = Data.kept(order, how, OPTIONS)
+        whole = data.reference.samples
+        seconds.append(whole.motion.samples * whole.period)
+        each = [part.samples for part in data.parts if isinstance(part, Chunk)]
+        apart = [smooth(own, np.sign(own.motion.v)) for own in each]
+        assert smooth(whole, np.sign(whole.motion.v)) == pytest.approx(np.concatenate(apart), abs=1e-9)
+    recorded = sum(float(np.ptp(log.time)) for log in logs)
+    assert seconds[0] == pytest.approx(seconds[1], rel=1e-12)
+    assert seconds[0] == pytest.approx(recorded, rel=0.05)

@@ -323,12 +323,15 @@ def _joined(chunks: Sequence[Chunk]) -> Chunk:
     samples = [chunk.samples for chunk in chunks]
     tau, moving = (np.concatenate([getattr(s, key) for s in samples]) for key in ("tau", "moving"))
     first = samples[0]
+    # Of logs of several rates it tells how long so many samples are together; a filter asks each run for its own.
+    periods, counts = [s.period for s in samples], [s.motion.samples for s in samples]
     spans = [s.spans for s in samples if s.spans is not None]
     whole = replace(
         first,
         motion=Motion.joined([s.motion for s in samples]),
         tau=tau,
         moving=moving,
+        period=float(np.average(periods, weights=counts)) if len(set(periods)) > 1 else first.period,
         spans=np.concatenate(spans) if len(spans) == len(samples) else None,
         unknown=None,
     )

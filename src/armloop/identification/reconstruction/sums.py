@@ -14,9 +14,8 @@ from operator import add
 
 import numpy as np
 
-from armloop.data.filters import LowPass
 from armloop.data.motion import Motion, Samples
-from armloop.data.signals import as_torque
+from armloop.data.signals import as_torque, smooth
 from armloop.features.wave_moments import WaveProducts, WaveSums
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.found import Found
@@ -72,7 +71,7 @@ class Usable:
         """(M, c) values at the usable samples of x (N, c), filtered like the torque; runs without any are left out."""
         runs = self.whole.motion.runs()
         used = [run for run in runs if np.diff(np.searchsorted(self.places, (run.start, run.stop)))[0]]
-        return LowPass(self.whole.cutoff_hz, self.whole.period).each(x, used)[self.places]
+        return smooth(self.whole, x, used)[self.places]
 
 
 @dataclass(frozen=True, eq=False)
