@@ -100,7 +100,7 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
             rotors[joint] += number(p["inertia"])
         elif name == "gravity_tilt":
             gravity = tilted_gravity(gravity, number(p["roll"]), number(p["pitch"]))
-            links = with_first_moment(links, p)
+            links = with_first_moment(arm, links, p)
         elif name == "joint_spring":
             k, q0 = number(p["stiffness"]), number(p["rest"])
             total = stiffness[joint] + k

@@ -148,12 +148,20 @@ def test_a_tilt_is_found_from_its_columns(context):
     assert found["first_moment"].value == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
 
 
-def test_on_a_vertical_axis_a_tilt_is_found_with_the_first_moment_that_a_level_arm_hides(context):
-    """The model, which knows a level arm alone, has another; its tilt is right nevertheless."""
+@pytest.mark.parametrize("column", [False, True])
+def test_on_a_vertical_axis_a_tilt_is_found_with_the_first_moment_that_a_level_arm_hides(column, context):
+    """The model, which knows a level arm alone, has another; its tilt is right nevertheless, on a lifting column too."""
     tilt, moment = effect("gravity_tilt", None), np.array([0.3, -0.2, 0.0])
     truly = {**TILT, "first_moment": (0.5 * moment).tolist()}
+    if column:
+        lift, *others = context.arm.joints
+        axis = np.vstack([context.arm.axis[0], context.arm.axis[:2]])
+        context = replace(
+            context, arm=replace(context.arm, joints=(replace(lift, kind="prismatic"), *others), axis=axis)
+        )
+    assert unshown_axes(context.arm)[0] == column
     other = np.array(context.inertial)
-    other[1:4] -= 0.5 * moment
+    other[10 * column + 1 : 10 * column + 4] -= 0.5 * moment
     level = regressor(context.arm, context.motion.q, context.motion.v, context.motion.vdot)
     np.testing.assert_allclose(level @ other, level @ context.inertial, atol=1e-9)
     unknowing = replace(context, inertial=other)
@@ -177,7 +185,7 @@ def test_gravity_shows_the_moment_about_any_other_first_axis(turned, context):
     else:
         first = replace(arm.joints[0], kind="prismatic")
         arm = replace(arm, joints=(first, *arm.joints[1:]))
-    assert unshown_axes(context.arm).any() and not unshown_axes(arm).any()
+    assert unshown_axes(context.arm)[1].any() and not unshown_axes(arm)[1].any()
     found = effect("gravity_tilt", None).estimates(arm, np.zeros(4), np.zeros((4, 4)), 0.0)
     assert set(found) == {"roll", "pitch"}
 

@@ -22,9 +22,9 @@ from armloop.robot.arm import Arm
 from armloop.robot.kinematics import LINK_PARAMETERS, regressor
 from armloop.util.errors import ModelError
 
-#: A first axis turned by less than this from the vertical, rad: level gravity shows no first moment about it.
+#: An axis turned by less than this from the vertical, rad, is upright.
 _UPRIGHT = 1e-3
-_FIRST_MOMENT = slice(LINK_PARAMETERS.index("mx"), LINK_PARAMETERS.index("mz") + 1)
+_MOMENT = LINK_PARAMETERS.index("mx")
 
 
 def base_rotation(roll: float, pitch: float) -> Array:
@@ -38,26 +38,31 @@ def tilted_gravity(gravity: Array, roll: float, pitch: float) -> Array:
     return np.asarray(base_rotation(roll, pitch).T @ gravity)
 
 
-def unshown_axes(arm: Arm) -> Array:
-    """(3, 2) axes in link 1's frame along which no motion above a level base shows its first moment; zeros without such.
+def unshown_axes(arm: Arm) -> tuple[int, Array]:
+    """A link, and (3, 2) axes in its frame along which no motion above a level base shows its first moment; else zeros.
 
-    About a vertical first axis the arm's first moments that turn with link 1 alone enter neither level gravity nor M(q).
+    About an upright first turning axis, carried by upright slides alone, the first moments that turn with its link alone
+    enter neither level gravity nor M(q).
     """
-    first = arm.axis[0]
-    axis, down = arm.X_PF[0, :3, :3] @ first, arm.gravity / np.linalg.norm(arm.gravity)
-    if not arm.revolute[0] or np.linalg.norm(np.cross(axis, down)) > _UPRIGHT:
-        return np.zeros((3, 2))
-    across = np.eye(3) - np.outer(first, first)
-    one = across[:, int(np.argmin(np.abs(first)))]
-    one = one / np.linalg.norm(one)
-    return np.column_stack([one, np.cross(first, one)])
+    down, R_WF = arm.gravity / np.linalg.norm(arm.gravity), np.eye(3)
+    for link, axis in enumerate(arm.axis):
+        R_WF = R_WF @ arm.X_PF[link, :3, :3]
+        if np.linalg.norm(np.cross(R_WF @ axis, down)) > _UPRIGHT:
+            break
+        if arm.revolute[link]:
+            across = np.eye(3) - np.outer(axis, axis)
+            one = across[:, int(np.argmin(np.abs(axis)))]
+            one = one / np.linalg.norm(one)
+            return link, np.column_stack([one, np.cross(axis, one)])
+    return 0, np.zeros((3, 2))
 
 
 class GravityTilt(Effect):
     """Gravity acts along another direction than the model took for granted.
 
-    On a vertical first axis it pulls at a first moment that a level arm's motion does not show, and that no model can
-    have: ``first_moment``, of link 1 in its frame, is found with the angles there, and is zero for what a model knows.
+    On an upright first turning axis it pulls at a first moment that a level arm's motion does not show, and that no model
+    can have: ``first_moment``, of the link that turns about it, in its frame, is found with the angles there, and is zero
+    for what a model knows.
     """
 
     name = "gravity_tilt"
@@ -85,7 +90,8 @@ class GravityTilt(Effect):
         zero = np.zeros_like(q)
         along = [regressor(arm, q, zero, zero, axis) for axis in np.eye(3)]
         own = np.stack([each @ context.inertial for each in along], axis=2)
-        unshown = np.stack([each[:, :, _FIRST_MOMENT] @ unshown_axes(arm) for each in along], axis=3)
+        link, axes = unshown_axes(arm)
+        unshown = np.stack([each[:, :, _of(link)] @ axes for each in along], axis=3)
         x, y, z = arm.gravity
         parts = [(x, 0, 0), (-z, 0, 0), (0, x, 0), (0, y, 0), (0, z, 0), (0, 0, x), (0, 0, -y), (0, 0, z)]
         P = np.array(parts, dtype=float).T
@@ -111,7 +117,7 @@ class GravityTilt(Effect):
             key: Estimate(float(value), error, "rad")
             for key, value, error in zip(("roll", "pitch"), x, errors, strict=False)
         }
-        axes = unshown_axes(arm)
+        _, axes = unshown_axes(arm)
         if axes.any():
             errors = std_errors(axes, covariance[2:, 2:]).tolist()
             found["first_moment"] = Estimate((axes @ x[2:]).tolist(), errors, "kg*m")
@@ -122,7 +128,7 @@ class GravityTilt(Effect):
             raise ModelError("effect gravity_tilt: its law needs the model's inertial parameters")
         tilted = tilted_gravity(arm.gravity, number(parameters["roll"]), number(parameters["pitch"]))
         # Gravity torques are linear in gravity: the difference of the two directions is one of them.
-        return Body(with_first_moment(inertial, parameters), tilted - arm.gravity, weight_only=True)
+        return Body(with_first_moment(arm, inertial, parameters), tilted - arm.gravity, weight_only=True)
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         q, still = context.motion.q, np.zeros_like(context.motion.q)
@@ -137,8 +143,14 @@ class GravityTilt(Effect):
         return f"the base is not level: rolled {roll:.2f}° about x and pitched {pitch:.2f}° about y"
 
 
-def with_first_moment(inertial: Array, parameters: Mapping[str, Value]) -> Array:
-    """Link parameters (10 n,) with a tilt's first moment of link 1, which a level arm does not show."""
-    links = np.array(inertial, dtype=float)
-    links[_FIRST_MOMENT] += np.asarray(parameters.get("first_moment", 0.0), dtype=float)
+def with_first_moment(arm: Arm, inertial: Array, parameters: Mapping[str, Value]) -> Array:
+    """Link parameters (10 n,) with a tilt's first moment of the first turning link, which a level arm does not show."""
+    links, (link, _) = np.array(inertial, dtype=float), unshown_axes(arm)
+    links[_of(link)] += np.asarray(parameters.get("first_moment", 0.0), dtype=float)
     return links
+
+
+def _of(link: int) -> slice:
+    """Where a link's first moment stands among the parameters of all."""
+    first = link * len(LINK_PARAMETERS) + _MOMENT
+    return slice(first, first + 3)
