@@ -166,6 +166,12 @@ def load_tracking(
         raise ScenarioError(
             f"{where}: controllers: {', '.join(sorted(twice))} stands there twice; name each once"
         )
+    if data.pickup and data.wear:
+        raise ScenarioError(f"{where}: pickup and wear are two kinds of run; give one of them")
+    if data.pickup and data.controllers != TrackingData().controllers:
+        raise ScenarioError(
+            f"{where}: controllers: a pickup is run by PID with the model's feedforward; leave them out"
+        )
     score = data.score or [0.0, reference.duration]
     least = _FEWEST_STEPS * period
     if len(score) != 2 or not 0 <= score[0] <= score[1] - least < score[1] <= reference.duration + 1e-9:
