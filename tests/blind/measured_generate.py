@@ -238,7 +238,7 @@ def _difference(urdf: Path, run: Smooth, mass: float = 0.0, tilt: float = 0.0) -
     plant.Finalize()
     context = plant.CreateDefaultContext()
     g = plant.gravity_field().gravity_vector()
-    turned = np.array([0.0, -np.sin(tilt) * g[2], np.cos(tilt) * g[2]]) - g
+    turned = np.array([0.0, np.sin(tilt) * g[2], np.cos(tilt) * g[2]]) - g  # as a base that is rolled sees it
     point = np.array([0.1, 0.0, 0.0])
     joints = [plant.get_joint(i) for i in plant.GetJointIndices(arm)]
     moving = [joint for joint in joints if joint.num_velocities() == 1]
