@@ -8,8 +8,10 @@ import pytest
 from answers import answered
 
 from armloop.drake.experiments.scenarios import load_tracking
+from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.reports.plots.loops import bode_figure
 from armloop.reports.tuning_tables import gains_table, margins_table, missed_notes, verified_table
+from armloop.util.errors import InputWarning
 from armloop.util.progress import silent
 from armloop.workflows import tune_scenario
 
@@ -56,3 +58,15 @@ def test_files_tables_and_a_better_loop(tmp_path):
     slow = missed_notes(dataclasses.replace(tuning, bandwidth=4 * np.pi * has, margin=thin))
     assert len(slow) == 3 and all("Hz of bandwidth, not" in note for note in slow)
     assert missed_notes(tuning)[0].startswith("Joint 2 has 4.4") and "and here they move it" in page
+
+
+def test_what_the_arm_has_beside_is_said_not_to_be_tuned_for(monkeypatch):
+    built_in = load_tracking("three_axis_tracking")
+    drag = UndeclaredEffect("quadratic_drag", 2, {"coefficient": 0.1})
+    with (
+        monkeypatch.context() as patch,
+        pytest.warns(InputWarning, match=r"without the scenario's effects \(.*joint 2\)"),
+    ):
+        patch.setattr("armloop.workflows.tuning.propose_gains", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            tune_scenario(dataclasses.replace(built_in, effects=(drag,)), 30.0, 60.0, None, None, silent)

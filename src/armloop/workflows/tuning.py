@@ -14,6 +14,7 @@ from armloop.drake.tuning.loop_analysis import model_posture, posture_model
 from armloop.drake.tuning.tuned_loop import TunedLoop, Tuning, look_at
 from armloop.dynamics import with_mass_matrix
 from armloop.model import ReconstructedModel
+from armloop.util.doubts import warn
 from armloop.util.files import write_figure, write_json, write_text
 from armloop.util.finite import finite
 from armloop.util.progress import Progress
@@ -48,6 +49,9 @@ def tune_scenario(
         if model is None
         else model_posture(with_mass_matrix(model), q0)
     )
+    if scenario.effects:
+        named = ", ".join(effect.build().label() for effect in scenario.effects)
+        warn(f"{scenario.name}: gains are tuned for the arm without the scenario's effects ({named})")
     gains = propose_gains(known, plant.config.time_step, bandwidth, margin)
     progress("trying the scenario's gains")
     present = look_at(scenario, scenario.gains)
