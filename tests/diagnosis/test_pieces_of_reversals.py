@@ -28,6 +28,7 @@ class Effect:
     joint: int | None = None
     other_joint: int | None = None
     complexity: int = 1
+    sensor: bool = False
 
     @property
     def place(self) -> tuple[Any, ...]:
@@ -232,6 +233,50 @@ class Known:
         return of((*self.fit.effects, effect))
 
 
+LATE: Any = Effect("late", sensor=True)
+
+
+@pytest.mark.parametrize(
+    ("left", "usual", "memory", "named"),
+    [
+        # what it leaves of the errors, 1 each, what the model always leaves, and the share of an effect in each joint
+        ([0.5, 0.5, 0.9], [1.0, 1.0, 1.0], [0.8, 0.8, 0.0], True),
+        ([0.5, 0.9, 0.9], [1.0, 1.0, 1.0], [0.8, 0.8, 0.0], False),  # at one joint alone
+        (
+            [0.5, 0.5, 0.9],
+            [1.0, 1.6, 1.0],
+            [0.8, 0.8, 0.0],
+            False,
+        ),  # of what the model always leaves, less than half
+        ([0.5, 0.5, 0.9], [1.0, 1.0, 1.0], [0.8, 0.86, 0.0], False),  # another removes a tenth more
+        ([0.5, 0.5, 1.9], [1.0, 1.0, 1.0], [0.8, 0.8, 0.0], False),  # the run as a whole is none the better
+    ],
+)
+def test_a_late_record_is_as_good_as_anything_in_a_joint_at_most_joints(
+    left: list[float], usual: list[float], memory: list[float], named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    joint, block = np.repeat(np.arange(3), 5), np.tile(np.arange(5), 3)
+
+    def fit(errors: Any, *effects: Any) -> Any:
+        found = fitted(joint, block, np.repeat(errors, 5) + 1e-3 * block)
+        found.effects = effects
+        return found
+
+    view = _View(np.ones(15, dtype=bool), joint, block, np.full(3, 0.01), np.array(usual))
+    known: Any = SimpleNamespace(fit=fit(np.ones(3)), trial=lambda effect: fit(np.array(left), effect))
+    monkeypatch.setattr(
+        reversals, "hypotheses", lambda arm: [Effect("load"), LATE, Effect("encoder", 1, sensor=True)]
+    )
+    gains = taken(*((Effect("memory", j + 1), {j: gain(share)}) for j, share in enumerate(memory)))
+    arm: Any = None
+    found = reversals._of_the_record(view, known, arm, gains)
+    assert (found is not None) == named
+    if found is not None:
+        assert found.effect is LATE and found.share == pytest.approx(0.75, abs=0.01) and not found.always
+    known.fit.effects = (LATE,)
+    assert reversals._of_the_record(view, known, arm, gains) is None
+
+
 def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -244,6 +289,7 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
         "_concerned",
         lambda arm, joints, fit: [e for e in every if e not in fit.effects and e.joint - 1 in joints],
     )
+    monkeypatch.setattr(reversals, "hypotheses", lambda arm: every)
     monkeypatch.setattr(reversals, "independent_rows", lambda samples: np.ones(6, dtype=bool))
     monkeypatch.setattr(reversals, "Outcome", lambda *of: of)
     unclear: set[tuple[str, int]] = set()
@@ -387,9 +433,11 @@ class TestReversals:
         np.testing.assert_allclose(view.mean_squares(self.fit(2.0, 3.0, 5.0)), [4.0, 9.0, np.nan])
         assert view.suspects(self.fit(2.0, 3.0, 5.0)) == [1]
         assert view.suspects(self.fit(2.1, 3.0, 5.0)) == [0, 1]
+        view = self.view()
         view.rows[20:24] = False
         assert view.suspects(self.fit(2.1, 3.0, 5.0)) == [0, 1]  # four blocks
-        view.rows[24:28] = False
+        view = self.view()
+        view.rows[20:28] = False
         assert view.suspects(self.fit(2.1, 3.0, 5.0)) == [0]
 
     def test_gains(self) -> None:

@@ -75,6 +75,27 @@ def test_memory_that_the_training_logs_do_not_show_has_come_since() -> None:
     assert "all along" not in " ".join(findings(diagnosis))
 
 
+def slow(seed: int, late: float) -> MotionLog:
+    """Four times slower, with noise: a late record shows where friction turns round, and hardly where the joints slide."""
+    fast = fourier_motion(20.0, 125.0, seed)
+    time = np.arange(0.0, 4 * fast.time[-1], 0.008)
+    q, v, vdot = (
+        np.column_stack([np.interp(time, 4 * fast.time, x) for x in values.T])
+        for values in (fast.q, fast.v / 4, fast.vdot / 16)
+    )
+    tau = rigid_torque(three_axis(), q, v, vdot) + LEVEL * np.sign(v) + v
+    tau = np.column_stack([np.interp(time - late, time, x) for x in tau.T])
+    return MotionLog(time, q, v, tau + np.random.default_rng(seed).normal(0, 0.6, tau.shape), name="slow")
+
+
+def test_a_late_record_is_no_memory_of_every_joint() -> None:
+    model = coulomb_and_viscous(slow(90, 0.0))
+    (found,) = diagnose(model, [slow(7, 0.012)]).to_dict()["effects"]
+    assert (found["effect"], found["condition"], found["when"]) == ("time_delay", "reversals", "changed")
+    seconds = found["parameters"]["seconds"]
+    assert abs(seconds["value"] - 0.012) < 3 * seconds["std_error"] < 0.002
+
+
 @pytest.mark.long
 def test_of_joints_that_never_turned_round_in_the_training_logs_nothing_is_said_there() -> None:
     model = coulomb_and_viscous(run(90, memory=True))

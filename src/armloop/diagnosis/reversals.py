@@ -8,16 +8,18 @@ sticks while it turns around does rest.
 
 So they are judged after the search, as a condition of their own. As no fit has seen them, what is named must be plain: it
 at least halves the joint's error there, on blocks that were not fitted, and what it removes is a noticeable torque. The
-drives of an arm are alike: what is plain at one joint needs less at the others. What the model leaves at the reversals of
-its training logs, too, it has lacked all along; the rest has changed since. Of a joint that never turned round in them
-nothing is said: a program that goes from point to point may rest at each. Nor of one whose friction has memory in
-the model, where the search found more dry friction: laws turn with the direction at once, but friction that rises keeps
-its memory, and what shows where the joint turns is that.
+drives of an arm are alike: what is plain at one joint needs less at the others. A record that is late shows wherever a
+joint turns, and little elsewhere: it is named if at most joints it is as good as what is of them alone. What the model
+leaves at the reversals of its training logs, too, it has lacked all along; the rest has changed since. Of a joint that
+never turned round in them nothing is said: a program that goes from point to point may rest at each. Nor of one whose
+friction has memory in the model, where the search found more dry friction: laws turn with the direction at once, but
+friction that rises keeps its memory, and what shows where the joint turns is that.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.stats import norm, t
@@ -94,7 +96,7 @@ def judge_reversals(
     while changed and len(found) < 2 * samples.motion.joints:
         for effect in _concerned(evidence.model.arm, changed, known.fit):
             gains.take(effect, view.gains(known.fit, known.trial(effect)))
-        best = gains.best()
+        best = _of_the_record(view, known, evidence.model.arm, gains) or gains.best()
         if best is None:
             break
         trial = known.trial(best.effect)
@@ -145,6 +147,23 @@ def _concerned(arm: Arm, joints: set[int], current: Fit) -> list[Effect]:
     ]
 
 
+def _of_the_record(view: _View, known: Known, arm: Arm, gains: _Gains) -> Found | None:
+    """A fault of the whole record, such as a delay, that removes most of what the model leaves there at most joints, two at
+    the least, and as much there as any effect in one of them does; None if there is none.
+    """
+    taken = {effect.place for effect in known.fit.effects}
+    for effect in (e for e in hypotheses(arm) if e.sensor and not e.indices and e.place not in taken):
+        of_joints = view.gains(known.fit, known.trial(effect))
+        told = [
+            j for j, gain in of_joints.items() if gain.news > MOSTLY and gain.share >= gains.most(j) - ALIKE
+        ]
+        if len(told) < 2 or 2 * len(told) <= len(view.joints):
+            continue
+        if _positive(np.concatenate([of_joints[j].ratios for j in told])):
+            return Found(effect, Shape.fixed(0.0), max(of_joints[j].share for j in told))
+    return None
+
+
 @dataclass(frozen=True, eq=False)
 class _View:
     """The rows at reversals of stacked rows (R,), and per joint (n,) the least mean square that is noticeable, and the one
@@ -172,11 +191,13 @@ class _View:
     def suspects(self, current: Fit) -> list[int]:
         """Joints (0-based) with enough reversals and an error there that an effect could noticeably lower."""
         errors = np.nan_to_num(self.mean_squares(current))
-        return [
-            j
-            for j in np.flatnonzero(errors > self.noticeable).tolist()
-            if len(np.unique(self.block[self.rows & (self.joint == j)])) >= _FEWEST
-        ]
+        return [j for j in np.flatnonzero(errors > self.noticeable).tolist() if j in self.joints]
+
+    @cached_property
+    def joints(self) -> list[int]:
+        """Joints (0-based) with enough reversals."""
+        turns = [len(np.unique(self.block[self.rows & (self.joint == j)])) for j in range(len(self.usual))]
+        return [j for j, count in enumerate(turns) if count >= _FEWEST]
 
     def gains(self, current: Fit, trial: Fit | None) -> dict[int, _Gain]:
         """Per suspect joint what a trial gains at its reversals; nothing if the run as a whole does not gain."""
@@ -195,18 +216,20 @@ class _View:
             MOSTLY * gain <= self.usual[j] * mine.sum(),
         )
         share = gain / float(before.sum()) if noticed else 0.0
-        return _Gain(share, np.log(sums[0] / sums[1]), bool(always))
+        news = gain / max(self.usual[j] * mine.sum(), TINY)
+        return _Gain(share, np.log(sums[0] / sums[1]), bool(always), news)
 
 
 @dataclass(frozen=True, eq=False)
 class _Gain:
     """Part of a joint's squared error at reversals that is removed, zero if hardly anything; log ratio per block; whether
-    the model leaves most of it at those of its training logs, too.
+    the model leaves most of it at those of its training logs, too; what is removed in parts of what it leaves there.
     """
 
     share: float
     ratios: Array
     always: bool = False
+    news: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,6 +262,10 @@ class _Gains:
         alone = self.by_effect[effect][j].ratios
         alike = [gain.ratios for gain in self.by_kind.get(effect.name, {}).values()]
         return _positive(alone) or (len(alike) > 1 and _positive(np.concatenate(alike)))
+
+    def most(self, j: int) -> float:
+        """The largest part of the squared error at a joint's (0-based) reversals that an effect removes."""
+        return max((own[j].share for own in self.by_effect.values() if j in own), default=0.0)
 
     def _least(self, effect: Effect) -> float:
         return MOSTLY if effect.name in self.found else PLAIN
