@@ -1,9 +1,13 @@
 """One sample at a time gives what the vectorised prediction gives, effects and steps included."""
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
 from armloop.data.motion import Motion
+from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import KINDS, Acting, FrictionLaw, FrictionTerm, Sliding, torque_along
 from armloop.model import AddedEffect, ReconstructedModel, load_model
@@ -103,3 +107,24 @@ def test_a_sensor_effect_is_predicted_but_not_supplied():
     motion = Motion(np.zeros(1), q[None], q[None], q[None], np.array([0]))
     assert faulty.predict(motion)[0, 0] == pytest.approx(model.predict(motion)[0, 0] + 0.5)
     np.testing.assert_allclose(faulty.feedforward(q, q, q), model.feedforward(q, q, q))
+
+
+def test_threads_that_ask_one_model_do_not_mix_their_samples():
+    """A control loop and a display beside it."""
+    arm = load_arm("three_axis")
+    rng, library = np.random.default_rng(0), DoubleFeatureSet((True,) * 3, 2, 1, "both")
+    terms = SparseTerms(3, library.index, rng.normal(size=(library.size, 3)))
+    model = ReconstructedModel(arm, (terms,), FrictionLaw(((),) * 3))
+    states = rng.uniform(-1, 1, (2, 3, 3))
+    right = [model.feedforward(*state).tolist() for state in states]
+
+    def asked(k: int) -> int:
+        return sum(model.feedforward(*states[k]).tolist() != right[k] for _ in range(5000))
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(2) as threads:
+            assert list(threads.map(asked, range(2))) == [0, 0]
+    finally:
+        sys.setswitchinterval(before)

@@ -7,6 +7,7 @@ one-shot SINDy need no more than three hundred.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from threading import Lock
 
 import numpy as np
 
@@ -47,7 +48,8 @@ class WaveTable:
         self._C, self._waves, self._width = C, w, width
         # Column by column: products with a short vector are then a third faster.
         self._flat, self._gather = np.asfortranarray(C.reshape(-1, m)), np.asfortranarray(gather)
-        # Calls of numpy are what costs: work space that stays, and few of them.
+        # Calls of numpy are what costs: work space that stays, one thread at a time, and few of them.
+        self._alone = Lock()
         self._state = np.ones(1 + 3 * n)
         self._motion = self._state[1:]
         self._gathered, self._inner = np.empty(len(gather)), np.empty(n * w)
@@ -57,13 +59,15 @@ class WaveTable:
 
     def torque(self, q: Array, v: Array, vdot: Array) -> Array:
         """(n,) torques of one sample."""
-        np.concatenate((q, v, vdot), out=self._motion)
-        return self._sum()
+        with self._alone:
+            np.concatenate((q, v, vdot), out=self._motion)
+            return self._sum()
 
     def stacked(self, motion: Array) -> Array:
         """(n,) torques of one sample whose q, v and vdot stand behind each other in one array (3n,)."""
-        self._motion[:] = motion
-        return self._sum()
+        with self._alone:
+            self._motion[:] = motion
+            return self._sum()
 
     def _sum(self) -> Array:
         np.dot(self._gather, self._state, self._gathered)
