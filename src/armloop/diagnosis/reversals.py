@@ -29,7 +29,7 @@ from armloop.data.reversals import at_reversals, passing
 from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
-from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NOTICEABLE, SIGNIFICANCE
+from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY, NOTICEABLE, SIGNIFICANCE
 from armloop.diagnosis.score import mean_by_joint
 from armloop.diagnosis.search import Found, Outcome, clear
 from armloop.diagnosis.trials import Known
@@ -148,14 +148,24 @@ def _concerned(arm: Arm, joints: set[int], current: Fit) -> list[Effect]:
 
 
 def _of_the_record(view: _View, known: Known, arm: Arm, gains: _Gains) -> Found | None:
-    """A fault of the whole record, such as a delay, that removes most of what the model leaves there at most joints, two at
-    the least, and as much there as any effect in one of them does; None if there is none.
+    """A fault of the whole record, such as a delay; None if there is none.
+
+    At most joints, two at the least, more is left than the model always leaves, and it removes more than half of that and as
+    much as any effect in one of them does. Where the joints slide it does no harm.
     """
-    taken = {effect.place for effect in known.fit.effects}
+    current, taken = known.fit, {effect.place for effect in known.fit.effects}
+    errors = np.nan_to_num(view.mean_squares(current))
     for effect in (e for e in hypotheses(arm) if e.sensor and not e.indices and e.place not in taken):
-        of_joints = view.gains(known.fit, known.trial(effect))
+        trial = known.trial(effect)
+        if trial is None or view.sliding(trial) > (1 + NEARLY) * view.sliding(current):
+            continue
+        of_joints = view.gains(current, trial)
         told = [
-            j for j, gain in of_joints.items() if gain.news > MOSTLY and gain.share >= gains.most(j) - ALIKE
+            j
+            for j, gain in of_joints.items()
+            if errors[j] > view.usual[j]
+            and gain.news > MOSTLY
+            and gain.share >= max(gains.most(j) - ALIKE, TINY)
         ]
         if len(told) < 2 or 2 * len(told) <= len(view.joints):
             continue
@@ -187,6 +197,10 @@ class _View:
     def mean_squares(self, fit: Fit) -> Array:
         """(n,) mean held-out squared error at reversals, weighted; NaN where there is none."""
         return mean_by_joint(self.joint[self.rows], fit.stacked.joints, fit.held_out[self.rows] ** 2)
+
+    def sliding(self, fit: Fit) -> float:
+        """Sum of the held-out squared errors, weighted, of all other rows."""
+        return float((fit.held_out[~self.rows] ** 2).sum())
 
     def suspects(self, current: Fit) -> list[int]:
         """Joints (0-based) with enough reversals and an error there that an effect could noticeably lower."""
