@@ -200,7 +200,9 @@ def _drawn(
             return {"gain": sign}, (), ("gain", 0.01, 0.5)
         case "encoder_offset":
             return {"offset": sign}, ("offset",), ("offset", 0.0, 0.3 if turns else 0.05)
-        case "time_delay":
+        case "torque_drift":
+            return {"rate": sign, "time_constant": rng.uniform(8.0, 30.0), "offset": 0.0}, ("rate",), any_size
+        case "time_delay" | "torque_delay":
             return {"seconds": 1.0}, ("seconds",), ("seconds", 2e-3, 0.1)
         case "external_contact":
             direction = rng.normal(size=3)

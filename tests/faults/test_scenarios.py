@@ -94,7 +94,7 @@ SCENARIOS: dict[str, tuple[str, str]] = {
     "a load and wear": ("plant: three_axis\npickup: {}\nwear: {}\n", "pickup and wear are two kinds of run"),
     "a load under other controllers": (
         "plant: three_axis\ncontrollers: [pid]\npickup: {}\n",
-        "controllers: a pickup is run by PID with the model's feedforward; leave them out",
+        "controllers: a pickup is run by pid_step3 alone; leave them out",
     ),
     "no controllers": ("plant: three_axis\ncontrollers: []\n", "controllers: empty"),
     "an unknown field": ("plant: three_axis\nKp: [80]\n", "field 'Kp' is unknown; there are: plant"),

@@ -91,7 +91,7 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
     missing += [
         f"{a.effect.label()}: the program's clock starts with the joint; the whole model here is that of a warm one"
         for a in model.effects
-        if a.effect.of_time
+        if a.effect.of_time and not a.effect.sensor
     ]
     return Exported(
         "drake",

@@ -168,10 +168,8 @@ def load_tracking(
         )
     if data.pickup and data.wear:
         raise ScenarioError(f"{where}: pickup and wear are two kinds of run; give one of them")
-    if data.pickup and data.controllers != TrackingData().controllers:
-        raise ScenarioError(
-            f"{where}: controllers: a pickup is run by PID with the model's feedforward; leave them out"
-        )
+    if data.pickup and data.controllers not in (["pid_step3"], TrackingData().controllers):
+        raise ScenarioError(f"{where}: controllers: a pickup is run by pid_step3 alone; leave them out")
     score = data.score or [0.0, reference.duration]
     least = _FEWEST_STEPS * period
     if len(score) != 2 or not 0 <= score[0] <= score[1] - least < score[1] <= reference.duration + 1e-9:
