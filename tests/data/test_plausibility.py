@@ -232,6 +232,17 @@ def torque(log: MotionLog, tau2: np.ndarray) -> list[str]:
     return replace(log, tau=tau).doubts()
 
 
+def test_a_torque_that_never_changes_is_said_where_its_joint_moves() -> None:
+    log = good()
+    for value in (0.0, 7.25):
+        said = torque(log, np.full(log.samples, value))
+        assert [line for line in said if line.startswith(f"column tau2 is {value:g} throughout, though")]
+    held = log.q.copy()
+    held[:, 1] = 0.3
+    still = MotionLog(log.time, held, log.v * [1, 0, 1], log.tau * [1, 0, 1])
+    assert not [line for line in still.doubts() if "throughout" in line]
+
+
 def test_a_torque_that_is_cut_off_is_said_at_either_end() -> None:
     log = good()
     own = log.tau[:, 1] - np.median(log.tau[:, 1])

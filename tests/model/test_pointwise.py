@@ -1,5 +1,6 @@
 """One sample at a time gives what the vectorised prediction gives, effects and steps included."""
 
+import pickle
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -128,3 +129,11 @@ def test_threads_that_ask_one_model_do_not_mix_their_samples():
             assert list(threads.map(asked, range(2))) == [0, 0]
     finally:
         sys.setswitchinterval(before)
+
+
+def test_a_model_goes_to_other_processes_after_it_was_asked_too():
+    model = model_with("payload")
+    state = np.random.default_rng(1).uniform(-1, 1, (3, 3))
+    torque = model.feedforward(*state)
+    there = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(there.feedforward(*state), torque)

@@ -159,3 +159,18 @@ def test_a_long_log_is_several_units_of_about_the_same_length() -> None:
     assert [p.stop - p.start for p in pieces] == [15, 16, 15, 15] or len(pieces) == 4
     assert pieces[0].start == 0 and pieces[-1].stop == 61
     assert unit_edges(np.full(20, 30.0)) == [slice(0, 20)]
+
+
+def test_without_a_filter_blocks_have_the_times_and_temperatures_of_the_log(
+    model: ReconstructedModel,
+) -> None:
+    log = operate(3, 0)
+    late = replace(log, time=log.time + 1.7e9, vdot=np.gradient(log.v, log.time, axis=0))
+    seconds = float(np.ptp(log.time))
+    warmth = np.linspace(20.0, 40.0, log.samples)
+    unfiltered = replace(model, conditioning=replace(model.conditioning, cutoff_hz=0.0))
+    sums = log_sums(unfiltered, late, {"temperature": warmth})
+    assert sums.start[0] == pytest.approx(late.time[0], abs=1.0)
+    assert sums.seconds.sum() == pytest.approx(seconds, rel=0.05)
+    middles = (sums.start + 0.5 * sums.seconds - late.time[0]) / seconds
+    np.testing.assert_allclose(sums.temperature[:, 0], 20.0 + 20.0 * middles, atol=0.5)

@@ -33,6 +33,8 @@ _SPIKE_SAMPLES, _SPIKE_RATIO, _FEWEST = 3, 10.0, 20
 _SPIKE_LEAST = {"q": 0.1, "v": 1.0, "vdot": 100.0, "tau": 1.0}
 # A jump of q: rad or m beyond what the neighbouring rates explain, and so many times what is usual in the log.
 _JUMP, _UNUSUAL = 0.1, 30.0
+# A joint that moves goes so far, rad or m.
+_MOVES = 1e-2
 # Samples a second that hardly any recorder takes.
 _HARDLY = 5000.0
 # Rows that tell whether a log is a time series.
@@ -60,10 +62,11 @@ def faults(log: Recorded) -> Iterator[Finding]:
 
 
 def doubts(log: Recorded) -> Iterator[Finding]:
-    """Yield what may be right and should be known: spikes, a torque that is stuck or cut off, v that lags, few samples."""
+    """Yield what may be right and should be known: spikes, a torque that is stuck or constant, v that lags, few samples."""
     if not is_time_series(log.q, log.runs):
         return
     yield from dropouts(log)
+    yield from _constant_torques(log)
     if log.derived:
         yield Finding("columns v", "are missing; v is the derivative of q")
     else:
@@ -78,6 +81,14 @@ def doubts(log: Recorded) -> Iterator[Finding]:
         yield Finding(
             "column time",
             f"has {rate:.3g} samples a second, more than recorders of arms take; check that it is in s",
+        )
+
+
+def _constant_torques(log: Recorded) -> Iterator[Finding]:
+    for j in np.flatnonzero((np.ptp(log.tau, axis=0) == 0) & (np.ptp(log.q, axis=0) > _MOVES)).tolist():
+        yield Finding(
+            f"column tau{j + 1}",
+            f"is {log.tau[0, j]:g} throughout, though the joint moves; if its torque was not recorded, leave the log out",
         )
 
 

@@ -275,6 +275,10 @@ class ReconstructedModel:
                 friction[law.along.joint] += law.terms
         return Parts(self.arm, self.components, friction, effects)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the functions that were made to be asked quickly: a model goes to other processes as it is."""
+        return {key: value for key, value in vars(self).items() if key != "_pointwise"}
+
     @cached_property
     def _pointwise(self) -> dict[int, InverseDynamics]:
         return {}

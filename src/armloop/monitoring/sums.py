@@ -7,7 +7,7 @@ its blocks', and the samples are needed no more.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -89,7 +89,8 @@ def log_sums(
     if log.joints != n:
         raise LogError(f"{log.name}: {log.joints} joints; the model's arm {model.arm.name} has {n}")
     samples = preprocess([log], model.conditioning)
-    motion = samples.motion
+    # Without a filter samples need be no time series, and have none of their own.
+    motion = samples.motion if samples.cutoff_hz > 0 else replace(samples.motion, time=log.time)
     # two samples per period of the corner: what lies closer is not told apart by the filter
     kept = np.flatnonzero(independent_rows(samples))[::2]
     slides = samples.moving[kept]
