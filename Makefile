@@ -63,7 +63,7 @@ loop: setup
 
 # With the packages of the documentation, whose site a long test builds. A test that hangs ends the run, and says where.
 test: types $(WRITING)
-	$(BIN)/pytest $(PYTEST_ARGS) -o faulthandler_timeout=400 -o faulthandler_exit_on_timeout=true -m "not long"
+	$(BIN)/pytest $(PYTEST_ARGS) -o faulthandler_timeout=1500 -o faulthandler_exit_on_timeout=true -m "not long"
 
 types: setup $(TESTING)
 	$(BIN)/ruff check .

@@ -3,9 +3,11 @@
 import pickle
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from synthetic import fourier_motion
 
 from armloop.data.motion import Motion
 from armloop.features.double_feature_set import DoubleFeatureSet
@@ -15,6 +17,7 @@ from armloop.model import AddedEffect, ReconstructedModel, load_model
 from armloop.model.components import RigidBody, SparseTerms
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters
+from armloop.util.errors import InputError
 from armloop.util.functions import MATH
 
 PARAMETERS = {
@@ -137,3 +140,18 @@ def test_a_model_goes_to_other_processes_after_it_was_asked_too():
     torque = model.feedforward(*state)
     there = pickle.loads(pickle.dumps(model))
     np.testing.assert_array_equal(there.feedforward(*state), torque)
+
+
+def test_drives_give_what_they_give_whatever_a_faulty_sensor_records() -> None:
+    arm, motion = load_arm("three_axis"), fourier_motion(2.0, 50.0, 1)
+    body = RigidBody(nominal_parameters(arm), (), np.zeros(0))
+    model = ReconstructedModel(arm, (body,), FrictionLaw(((),) * 3))
+    half = AddedEffect(effect("torque_gain", 2), {"gain": Estimate(0.5, 0.0, "1")})
+    spring = AddedEffect(
+        effect("joint_spring", 1), {"stiffness": Estimate(2.0, 0.0, ""), "rest": Estimate(0.1, 0.0, "")}
+    )
+    torque = model.with_effects([half, spring]).supplied(motion)
+    np.testing.assert_allclose(torque, model.with_effects([spring]).predict(motion), atol=1e-12)
+    assert np.abs(torque - model.predict(motion)).max() > 0.1
+    with pytest.raises(InputError, match=r"predicts motor currents \(A\).*--drive-gains"):
+        replace(model, recorded={"unit": "A", "drive_gains": None}).supplied(motion)

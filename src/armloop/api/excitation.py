@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from armloop.api.reading import as_arm, require_model
 from armloop.api.shown import displayed, page
 from armloop.commands.excite import Excite as Command
-from armloop.experiment.design import Excitation, Settings, baseline_noise, drive_torque
+from armloop.experiment.design import Excitation, Settings, baseline_noise
 from armloop.experiment.design import excite as run
 from armloop.experiment.excitation import MotionRanges, ranges_with, write_reference
 from armloop.identification.reconstruction.reconstruct import default_conditioning, default_library
@@ -165,7 +165,7 @@ def excite(
         seed=seed,
     )
     ranges = ranges_with(arm, _plants(arm), **given)
-    return Reference(run(arm, ranges, settings, drive_torque(model) if model else None, progress))
+    return Reference(run(arm, ranges, settings, model.supplied if model else None, progress))
 
 
 def _plants(arm: Arm) -> MotionRanges | None:

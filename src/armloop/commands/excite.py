@@ -58,7 +58,7 @@ class Excite(Ranges, Chain, Json):
 def run(options: Excite) -> None:
     """Design an exciting reference and write it."""
     from armloop.commands.shared import arm_of, print_json, progress, take_reference
-    from armloop.experiment.design import Settings, baseline_noise, drive_torque, excite
+    from armloop.experiment.design import Settings, baseline_noise, excite
     from armloop.experiment.excitation import write_reference
     from armloop.identification.reconstruction.reconstruct import default_conditioning, default_library
     from armloop.model import load_model
@@ -70,7 +70,6 @@ def run(options: Excite) -> None:
     arm = arm_of(options)
     library = options.library or default_library(arm)
     model = load_model(options.model, arm) if options.model else None
-    torque = drive_torque(model) if model else None
     noise = numbers(options.noise, "--noise", arm)
     if noise is None and model is not None:
         noise = baseline_noise(model.baseline.get("rmse"))
@@ -92,7 +91,7 @@ def run(options: Excite) -> None:
     whole = options.arm in urdf_names() and not options.lock and options.tip is None
     found = read_ranges(options, arm, options.arm if whole else "urdf")
     tell = progress(options)
-    result = excite(arm, found, settings, torque, tell)
+    result = excite(arm, found, settings, model.supplied if model else None, tell)
     ratio = None
     if options.compare or options.report:
         tell("simulating noisy regressions on this reference and on random ones")

@@ -27,7 +27,7 @@ from armloop.model.pointwise import InverseDynamics, Parts, pointwise, stacked
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
 from armloop.util.arrays import Array
-from armloop.util.errors import ArmError, ModelError
+from armloop.util.errors import ArmError, InputError, ModelError
 from armloop.util.files import write_json
 from armloop.util.given import numbers_of
 from armloop.util.reading import read_json
@@ -181,6 +181,19 @@ class ReconstructedModel:
         for fault in faults:
             tau = tau + fault.torque(replace(context, predicted=tau))
         return tau
+
+    def supplied(self, motion: Motion) -> Array:
+        """Torques of the drives, (N, n) in N·m (N): without what a faulty sensor adds to the record.
+
+        Raises:
+            InputError: the model predicts currents.
+        """
+        if self.in_amperes:
+            raise InputError(
+                "the model predicts motor currents (A), which no limit of effort holds for; reconstruct it with "
+                "--drive-gains K1,..,KN (N·m/A)"
+            )
+        return self.predict(motion, sensors=False)
 
     def _mechanical(self, motion: Motion) -> tuple[Array, Array]:
         """Torque of the arm itself, effects included and sensor faults not, and the load on its joints."""

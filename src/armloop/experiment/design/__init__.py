@@ -8,7 +8,7 @@ from armloop.experiment.design.criteria import CRITERIA, Criterion, condition_nu
 from armloop.experiment.design.data_ratio import DataRatio, amount_needed, data_ratio
 from armloop.experiment.design.excite import Excitation, Measure, excite, measured
 from armloop.experiment.design.information import Columns, Regression
-from armloop.experiment.design.limits import Limits, TorqueLaw, check_rest, drive_torque, nominal_torque
+from armloop.experiment.design.limits import Limits, TorqueLaw, check_rest, nominal_torque
 from armloop.experiment.design.optimise import Design, Problem
 from armloop.experiment.design.random import random_references
 from armloop.experiment.design.series import Series, sampled
@@ -34,7 +34,6 @@ __all__ = [
     "check_rest",
     "condition_number",
     "data_ratio",
-    "drive_torque",
     "excite",
     "measured",
     "nominal_torque",

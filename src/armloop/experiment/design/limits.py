@@ -5,13 +5,11 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.experiment.excitation import FourierReference, MotionRanges, static_poses
-from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
 from armloop.robot.newton_euler import joint_torques
@@ -110,19 +108,6 @@ def _motion(reference: FourierReference, step: float) -> Motion:
     # the end belongs to the motion: a ramp, or a duration that is no whole period, may end at its extreme
     t = np.append(np.arange(0.0, reference.duration, step), reference.duration)
     return Motion(t, *reference.evaluate(t))
-
-
-def drive_torque(model: ReconstructedModel) -> TorqueLaw:
-    """Torque that a model's drives give, N*m (N): without what a faulty sensor adds to the record.
-
-    Raises ``InputError`` for a model of motor currents.
-    """
-    if model.in_amperes:
-        raise InputError(
-            "the model predicts motor currents (A), which no limit of effort holds for; reconstruct it with --drive-gains "
-            "K1,..,KN (N·m/A)"
-        )
-    return partial(model.predict, sensors=False)
 
 
 def nominal_torque(arm: Arm) -> TorqueLaw:
