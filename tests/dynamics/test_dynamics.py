@@ -13,6 +13,7 @@ from armloop.dynamics import Dynamics, nearest_rigid_body, require_mass_matrix, 
 from armloop.laws.friction import FrictionTerm
 from armloop.model.components import RigidBody, SparseTerms
 from armloop.robot.arm import Arm, load_arm
+from armloop.robot.kinematics import nominal_parameters, regressor
 from armloop.util.errors import ModelError
 
 ARMS = {name: load_arm(name) for name in ("three_axis", "scara")}
@@ -97,6 +98,29 @@ def test_an_unsymmetric_mass_matrix_is_told_apart_from_an_impossible_one():
         ModelError, match=r"not positive definite: its smallest eigenvalue is -.*nearest_rigid_body"
     ):
         require_mass_matrix(negative)
+
+
+@pytest.mark.parametrize("kind", ["rigid body", "energies"])
+def test_the_nearest_rigid_body_has_the_models_rotors_and_they_weigh_nothing(kind):
+    """Of a model that says what its links are, and of one of which only the torques tell it."""
+    arm, rotors = ARMS["scara"], np.array([0.15, 0.1, 3.0, 0.05])
+    links = nominal_parameters(arm)
+    body = RigidBody(np.concatenate([links, rotors]), (), np.zeros(0))
+    parts = [body]
+    if kind == "energies":
+        inertias = energies(arm)
+        motors = RigidBody(np.concatenate([0 * links, rotors]), (), np.zeros(0))
+        parts = [inertias, motors]
+    model = model_of(arm, *parts)
+    q = np.array([0.3, -0.5, 0.02, 0.4])
+    near = nearest_rigid_body(model)
+    assert_allclose(Dynamics(near).mass_matrix(q), Dynamics(model).mass_matrix(q), atol=1e-6)
+    q, still = q[None], np.zeros((1, 4))
+    leaning = np.array([0.5, 0.3, -9.8])
+    wanted, weight = (
+        regressor(arm, q, still, still, leaning)[0] @ own for own in (links, model.inertial_parameters())
+    )
+    assert_allclose(weight, wanted, atol=2e-3 * np.abs(wanted).max())
 
 
 def test_the_nearest_rigid_body_averages_the_errors_of_terms_out():

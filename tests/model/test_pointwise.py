@@ -121,9 +121,12 @@ def test_threads_that_ask_one_model_do_not_mix_their_samples():
     model = ReconstructedModel(arm, (terms,), FrictionLaw(((),) * 3))
     states = rng.uniform(-1, 1, (2, 3, 3))
     right = [model.feedforward(*state).tolist() for state in states]
+    drive, at_once = model.stacked_drive(), states.reshape(2, -1)
+    assert [drive(x) for x in at_once] == right
 
     def asked(k: int) -> int:
-        return sum(model.feedforward(*states[k]).tolist() != right[k] for _ in range(5000))
+        by_parts = sum(model.feedforward(*states[k]).tolist() != right[k] for _ in range(5000))
+        return by_parts + sum(drive(at_once[k]) != right[k] for _ in range(5000))
 
     before = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
@@ -142,16 +145,23 @@ def test_a_model_goes_to_other_processes_after_it_was_asked_too():
     np.testing.assert_array_equal(there.feedforward(*state), torque)
 
 
-def test_drives_give_what_they_give_whatever_a_faulty_sensor_records() -> None:
+def test_drives_give_what_they_give_whatever_a_faulty_sensor_records_or_somebody_pushed() -> None:
     arm, motion = load_arm("three_axis"), fourier_motion(2.0, 50.0, 1)
     body = RigidBody(nominal_parameters(arm), (), np.zeros(0))
     model = ReconstructedModel(arm, (body,), FrictionLaw(((),) * 3))
-    half = AddedEffect(effect("torque_gain", 2), {"gain": Estimate(0.5, 0.0, "1")})
-    spring = AddedEffect(
-        effect("joint_spring", 1), {"stiffness": Estimate(2.0, 0.0, ""), "rest": Estimate(0.1, 0.0, "")}
+
+    def added(name: str, joint: int, **parameters: float) -> AddedEffect:
+        return AddedEffect(effect(name, joint), {k: Estimate(x, 0.0, "") for k, x in parameters.items()})
+
+    gain, push = (
+        added("torque_gain", 2, gain=0.5),
+        added("external_torque", 3, start=0.5, end=1.0, torque=4.0),
     )
-    torque = model.with_effects([half, spring]).supplied(motion)
+    spring = added("joint_spring", 1, stiffness=2.0, rest=0.1)
+    whole = model.with_effects([gain, push, spring])
+    torque = whole.of_the_drives().predict(motion)
     np.testing.assert_allclose(torque, model.with_effects([spring]).predict(motion), atol=1e-12)
-    assert np.abs(torque - model.predict(motion)).max() > 0.1
-    with pytest.raises(InputError, match=r"predicts motor currents \(A\).*--drive-gains"):
-        replace(model, recorded={"unit": "A", "drive_gains": None}).supplied(motion)
+    off = np.abs(torque - whole.predict(motion)).max(axis=0)
+    assert off[1] > 0.1 and off[2] == pytest.approx(4.0)
+    with pytest.raises(InputError, match=r"the model predicts motor currents \(A\).*--drive-gains"):
+        replace(model, recorded={"unit": "A", "drive_gains": None}).of_the_drives()

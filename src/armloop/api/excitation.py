@@ -165,7 +165,7 @@ def excite(
         seed=seed,
     )
     ranges = ranges_with(arm, _plants(arm), **given)
-    return Reference(run(arm, ranges, settings, model.supplied if model else None, progress))
+    return Reference(run(arm, ranges, settings, model.of_the_drives().predict if model else None, progress))
 
 
 def _plants(arm: Arm) -> MotionRanges | None:

@@ -91,7 +91,7 @@ def run(options: Excite) -> None:
     whole = options.arm in urdf_names() and not options.lock and options.tip is None
     found = read_ranges(options, arm, options.arm if whole else "urdf")
     tell = progress(options)
-    result = excite(arm, found, settings, model.supplied if model else None, tell)
+    result = excite(arm, found, settings, model.of_the_drives().predict if model else None, tell)
     ratio = None
     if options.compare or options.report:
         tell("simulating noisy regressions on this reference and on random ones")

@@ -243,11 +243,7 @@ def diagnose(
     Raises:
         InputError: the logs do not fit the model.
     """
-    if model.in_amperes:
-        raise InputError(
-            "the model predicts motor currents (A), in which no effect has its physical size; "
-            "reconstruct it with --drive-gains K1,..,KN (N·m/A)"
-        )
+    model.require_torques()
     for log in logs:
         if log.joints != model.arm.n:
             raise InputError(

@@ -174,13 +174,14 @@ def nearest_rigid_body(model: ReconstructedModel) -> ReconstructedModel:
     Terms that were found joint by joint in noisy data predict torques well, and yet the mass matrix that they imply
     may have a wrong sign somewhere; one body's inertias, shared by all joints, average the noise out and make M
     symmetric, C and gravity consistent with it. Found by least squares on random motion within the range that the model
-    was fitted on (:meth:`ReconstructedModel.inertial_parameters`), with the arm's kinematics. Friction and effects stay.
+    was fitted on (:meth:`ReconstructedModel.inertial_parameters`, and rotors), with the arm's kinematics. Friction and
+    effects stay.
 
     What the torques do not reveal is taken from the arm's nominal parameters. Nothing forces the
     parameters to be physical: :func:`require_mass_matrix` still has the last word.
     """
-    full = model.inertial_parameters()
-    base = BaseParameters.of_arm(model.arm)
+    full = np.concatenate([model.inertial_parameters(), model.rotor_inertias()])
+    base = BaseParameters.of_arm(model.arm, rotors=True)
     return replace(model, components=(RigidBody(full, tuple(base.names), base.from_full(full)),))
 
 

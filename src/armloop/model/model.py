@@ -18,14 +18,15 @@ import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.data.signals import Conditioning
-from armloop.laws.effects import Context, Effect, Estimate, Value, effect
-from armloop.laws.effects.base import Placed, entry, fill
-from armloop.laws.effects.base import Pointwise as EffectPointwise
+from armloop.features.rigid_body import full_columns
+from armloop.laws.effects import Context, Effect
+from armloop.laws.effects.base import fill
 from armloop.laws.friction import FrictionLaw
+from armloop.model.added_effect import AddedEffect
 from armloop.model.components import COMPONENTS, Component, RigidBody
 from armloop.model.pointwise import InverseDynamics, Parts, pointwise, stacked
 from armloop.robot.arm import Arm
-from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.robot.kinematics import nominal_parameters
 from armloop.util.arrays import Array
 from armloop.util.errors import ArmError, InputError, ModelError
 from armloop.util.files import write_json
@@ -40,62 +41,6 @@ _STOP = (
     "stop(q,w) is friction with memory, from -1 to 1: the stretch since the last reversal, in parts of the w, rad or m,\n"
     "  at which the joint slides"
 )
-
-
-@dataclass(frozen=True)
-class AddedEffect:
-    """An effect that is not among the model's components, with its estimated parameters.
-
-    ``when`` is ``"always"`` where a reconstruction found it in the training data, None where a diagnosis added it.
-    """
-
-    effect: Effect
-    parameters: dict[str, Estimate]
-    when: str | None = None
-
-    def torque(self, context: Context) -> Array:
-        """(N, n) torque of the effect."""
-        return self.effect.torque(context, self.values)
-
-    def pointwise(self, arm: Arm, inertial: Array | None) -> EffectPointwise:
-        """The effect's torque for one sample at a time."""
-        return self.effect.pointwise(arm, self.values, inertial)
-
-    def placed(self) -> Placed | None:
-        """The effect's law along its direction, where it has one."""
-        return self.effect.placed(self.values)
-
-    @property
-    def values(self) -> dict[str, Value]:
-        """The parameters without their errors."""
-        return {key: e.value for key, e in self.parameters.items()}
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-ready values, as in ``diagnosis.json``."""
-        return {
-            **entry(*self.effect.place),
-            "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
-            **({"when": self.when} if self.when else {}),
-        }
-
-    @staticmethod
-    def from_dict(data: dict[str, Any]) -> AddedEffect:
-        """Rebuild from :meth:`to_dict`."""
-        return AddedEffect(
-            effect(data["effect"], data["joint"], data.get("other_joint")),
-            {
-                key: Estimate(e["value"], _error(e["std_error"]), str(e["unit"]))
-                for key, e in data["parameters"].items()
-            },
-            data.get("when"),
-        )
-
-
-def _error(value: Any) -> Any:
-    """A standard error as it is read: null where nobody knows it."""
-    if isinstance(value, list):
-        return [_error(each) for each in value]
-    return math.nan if value is None else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,18 +127,26 @@ class ReconstructedModel:
             tau = tau + fault.torque(replace(context, predicted=tau))
         return tau
 
-    def supplied(self, motion: Motion) -> Array:
-        """Torques of the drives, (N, n) in N·m (N): without what a faulty sensor adds to the record.
+    def of_the_drives(self) -> ReconstructedModel:
+        """The model of what the drives supply: without faults of sensors, which the record alone has, and without events.
 
         Raises:
             InputError: the model predicts currents.
         """
+        self.require_torques()
+        return replace(self, effects=tuple(self._supplied))
+
+    def require_torques(self, where: str = "the model") -> None:
+        """Raise ``InputError`` if the model predicts currents: in them nothing has its physical size."""
         if self.in_amperes:
             raise InputError(
-                "the model predicts motor currents (A), which no limit of effort holds for; reconstruct it with "
-                "--drive-gains K1,..,KN (N·m/A)"
+                f"{where} predicts motor currents (A), in which no effect and no limit has its physical size; "
+                "reconstruct it with --drive-gains K1,..,KN (N·m/A)"
             )
-        return self.predict(motion, sensors=False)
+
+    @property
+    def _supplied(self) -> list[AddedEffect]:
+        return [added for added in self.effects if not added.effect.sensor and not added.effect.event]
 
     def _mechanical(self, motion: Motion) -> tuple[Array, Array]:
         """Torque of the arm itself, effects included and sensor faults not, and the load on its joints."""
@@ -228,25 +181,33 @@ class ReconstructedModel:
         )
 
     def inertial_parameters(self) -> Array:
-        """(10 n,) link parameters that reproduce the model's rigid-body torques.
+        """(10 n,) link parameters that reproduce the model's rigid-body torques beside rotors (:meth:`rotor_inertias`).
 
-        Found by least squares on random motion within the ranges the model was fitted on; where the
-        torques do not reveal a parameter, the arm's nominal value stands.
+        Those of its rigid body, else found by least squares on random motion within the ranges the model was fitted on;
+        where the torques do not reveal a parameter, the arm's nominal value stands.
         """
-        return self._inertial.copy()
+        return self._rigid[0].copy()
+
+    def rotor_inertias(self) -> Array:
+        """(n,) inertias of motors behind gears that reproduce them beside the links, kg·m² (kg)."""
+        return self._rigid[1].copy()
 
     @cached_property
-    def _inertial(self) -> Array:
-        if "inertial" in self.history:
-            return np.asarray(self.history["inertial"], dtype=float)
+    def _rigid(self) -> tuple[Array, Array]:
         n, rng = self.arm.n, np.random.default_rng(0)
+        full, bodies = np.zeros(11 * n), [c for c in self.components if isinstance(c, RigidBody)]
+        if bodies and len(bodies) == len(self.components):
+            for body in bodies:
+                full[: len(body.parameters)] += body.parameters
+            return full[: 10 * n], full[10 * n :]
         size = self.ranges
         q, v, vdot = rng.uniform(-1, 1, (3, 400, n)) * size[:3, None]
         part = Motion(np.arange(400.0), q + size[3], v, vdot)
-        Y = regressor(self.arm, part.q, v, vdot).reshape(-1, 10 * n)
-        nominal = nominal_parameters(self.arm)
+        Y = full_columns(self.arm, part, rotors=True).reshape(-1, 11 * n)
+        nominal = np.concatenate([nominal_parameters(self.arm), np.zeros(n)])
         rest = self.rigid_body(part).ravel() - Y @ nominal
-        return nominal + np.linalg.lstsq(Y, rest, rcond=1e-4)[0]
+        found = nominal + np.linalg.lstsq(Y, rest, rcond=1e-4)[0]
+        return found[: 10 * n], found[10 * n :]
 
     def feedforward(
         self, q: Array, v: Array, vdot: Array, step: int = 3, sliding: Array | None = None
@@ -276,7 +237,7 @@ class ReconstructedModel:
 
     def _parts(self, step: int) -> Parts:
         """What acts at one sample: added effects that are friction of one joint stand with its friction."""
-        added = [a for a in self.effects if step >= 3 and not a.effect.sensor and not a.effect.event]
+        added = self._supplied if step >= 3 else []
         inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
         friction = [[t.acting for t in joint if t.step <= step] for joint in self.friction.terms]
         effects = []

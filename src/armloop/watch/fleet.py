@@ -44,11 +44,7 @@ def model_and_digest(path: Path) -> tuple[ReconstructedModel, str]:
         InputError: the model cannot be read, or predicts currents.
     """
     model = load_model(path)
-    if model.in_amperes:
-        raise InputError(
-            f"{path}: predicts motor currents (A), in which no effect has its physical size; "
-            "reconstruct it with --drive-gains K1,..,KN (N·m/A)"
-        )
+    model.require_torques(f"{path}:")
     digest = hashlib.sha256(path.read_bytes())
     for effect, shape in watched(model):
         digest.update(f"{effect.label()} {shape!r}\n".encode())
