@@ -233,69 +233,6 @@ class Known:
         return of((*self.fit.effects, effect))
 
 
-LATE: Any = Effect("late", sensor=True)
-
-
-@pytest.mark.parametrize(
-    ("left", "usual", "memory", "slides", "named"),
-    [
-        # what is left of errors of 1, what the model always leaves, squared, the share of an effect in each joint, and how
-        # the error grows where the joints slide
-        ([0.5, 0.5, 0.9], [0.9, 0.9, 0.9], [0.8, 0.8, 0.0], 1.0, True),
-        ([0.5, 0.9, 0.9], [0.9, 0.9, 0.9], [0.8, 0.8, 0.0], 1.0, False),  # at one joint alone
-        (
-            [0.5, 0.5, 0.9],
-            [0.9, 1.1, 0.9],
-            [0.8, 0.8, 0.0],
-            1.0,
-            False,
-        ),  # no more than the model always leaves
-        ([0.5, 0.8, 0.9], [0.9, 0.9, 0.9], [0.8, 0.3, 0.0], 1.0, False),  # of that less than half
-        ([0.5, 0.5, 0.9], [0.9, 0.9, 0.9], [0.8, 0.86, 0.0], 1.0, False),  # another removes a tenth more
-        (
-            [0.5, 0.5, 1.9],
-            [0.9, 0.9, 0.9],
-            [0.8, 0.8, 0.0],
-            1.0,
-            False,
-        ),  # the run as a whole is none the better
-        ([0.5, 0.5, 0.9], [0.9, 0.9, 0.9], [0.8, 0.8, 0.0], 1.01, False),
-    ],
-)
-def test_a_late_record_is_as_good_as_anything_in_a_joint_at_most_joints(
-    left: list[float],
-    usual: list[float],
-    memory: list[float],
-    slides: float,
-    named: bool,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    # five rows of each joint at reversals, and one that slides
-    joint, block = np.repeat(np.arange(3), 6), np.tile(np.arange(6), 3)
-
-    def fit(errors: Any, sliding: float, *effects: Any) -> Any:
-        held_out = np.repeat(errors, 6) + 1e-3 * block
-        held_out[block == 5] = sliding
-        found = fitted(joint, block, held_out)
-        found.effects = effects
-        return found
-
-    view = _View(block < 5, joint, block, np.full(3, 0.01), np.array(usual))
-    known: Any = SimpleNamespace(
-        fit=fit(np.ones(3), 1.0), trial=lambda effect: fit(np.array(left), slides, effect)
-    )
-    hypotheses = [Effect("load"), LATE, Effect("encoder", 1, sensor=True)]
-    monkeypatch.setattr(reversals, "hypotheses", lambda arm: hypotheses)
-    gains = taken(*((Effect("memory", j + 1), {j: gain(share)}) for j, share in enumerate(memory)))
-    arm: Any = None
-    found = reversals._of_the_record(view, known, arm, gains)
-    assert (found is not None) == named
-    if found is not None:
-        assert found.effect is LATE and found.share == pytest.approx(0.75, abs=0.01) and not found.always
-    known.fit.effects = (LATE,)
-    assert reversals._of_the_record(view, known, arm, gains) is None
-
-
 def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

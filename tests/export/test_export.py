@@ -84,6 +84,17 @@ def test_what_a_target_can_say_reads_back(tmp_path, target, name, rotors):
         assert found.missing == [] and (found.unsaid < 1e-6 * found.rms).all()
 
 
+@pytest.mark.parametrize("rotors", [False, True])
+@pytest.mark.parametrize("name", ARMS)
+def test_a_tilt_reads_back_with_the_first_moment_that_a_level_arm_hides(tmp_path, name, rotors):
+    pytest.importorskip("mujoco")
+    for moment in ([0.0, 0.0, 0.0], [0.05, -0.03, 0.0]):
+        tilt = ("gravity_tilt", None, {"roll": 0.03, "pitch": -0.02, "first_moment": moment})
+        model = model_of(ARMS[name], disguised(ARMS[name], rotors), friction=PLAIN, effects=(tilt,))
+        found = export(model, "mjcf", tmp_path / "arm")
+        assert found.unsaid is not None and (found.unsaid < 1e-6 * found.rms).all()
+
+
 @pytest.mark.parametrize("target", ["urdf", "sdf", "drake"])
 def test_what_becomes_of_the_links_names_is_said(tmp_path, target):
     arm = replace(ARMS["three_axis"], X_tool=np.eye(4))

@@ -123,7 +123,8 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
         if stiffness[j] < 0:
             missing.append(f"joint {j + 1}: a spring that pushes, {stiffness[j]:.4g}")
             stiffness[j] = 0.0
-    found = _bodies(model, links, rotors, missing, notes)
+    # under the gravity that they are in: a base that leans shows more of them
+    found = _bodies(replace(arm, gravity=gravity), model, links, rotors, missing, notes)
     return Said(arm, found.links, found.rotors, damping, dry, stiffness, rest, gravity, missing, notes)
 
 
@@ -242,9 +243,8 @@ _WORDS = {
 
 
 def _bodies(
-    model: ReconstructedModel, links: Array, rotors: Array, missing: list[str], notes: list[str]
+    arm: Arm, model: ReconstructedModel, links: Array, rotors: Array, missing: list[str], notes: list[str]
 ) -> ConsistentInertia:
-    arm = model.arm
     prior = nominal_parameters(arm)
     if not prior[::10].any():
         notes.append(

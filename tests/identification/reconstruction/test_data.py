@@ -21,6 +21,7 @@ from armloop.identification.reconstruction import Options, Reconstruction, recon
 from armloop.identification.reconstruction import data as data_module
 from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.nearest_regime import Sorter
+from armloop.identification.reconstruction.sums import Usable
 from armloop.regression.sparse import Sparse
 from armloop.util.workers import Processes, Serial, Workers
 
@@ -257,6 +258,9 @@ def test_logs_of_several_rates_are_filtered_each_at_its_own_and_count_alike_in_a
         each = [part.samples for part in data.parts if isinstance(part, Chunk)]
         apart = [smooth(own, np.sign(own.motion.v)) for own in each]
         assert smooth(whole, np.sign(whole.motion.v)) == pytest.approx(np.concatenate(apart), abs=1e-9)
+        every, still = np.arange(whole.motion.samples), np.zeros(whole.motion.samples, dtype=bool)
+        fitted = Usable(whole, every, whole.motion, whole.tau, whole.tau, whole.moving, still, 0 * every)
+        assert fitted.filtered(np.sign(whole.motion.v)) == pytest.approx(np.concatenate(apart), abs=1e-9)
     recorded = sum(float(np.ptp(log.time)) for log in logs)
     assert seconds[0] == pytest.approx(seconds[1], rel=1e-12)
     assert seconds[0] == pytest.approx(recorded, rel=0.05)

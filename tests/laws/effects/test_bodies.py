@@ -148,17 +148,22 @@ def test_a_tilt_is_found_from_its_columns(context):
     assert found["first_moment"].value == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
 
 
-@pytest.mark.parametrize("column", [False, True])
-def test_on_a_vertical_axis_a_tilt_is_found_with_the_first_moment_that_a_level_arm_hides(column, context):
+@pytest.mark.parametrize(("column", "turned"), [(False, False), (True, False), (True, True)])
+def test_on_a_vertical_axis_a_tilt_is_found_with_the_first_moment_that_a_level_arm_hides(
+    column, turned, context
+):
     """The model, which knows a level arm alone, has another; its tilt is right nevertheless, on a lifting column too."""
     tilt, moment = effect("gravity_tilt", None), np.array([0.3, -0.2, 0.0])
     truly = {**TILT, "first_moment": (0.5 * moment).tolist()}
     if column:
         lift, *others = context.arm.joints
-        axis = np.vstack([context.arm.axis[0], context.arm.axis[:2]])
-        context = replace(
-            context, arm=replace(context.arm, joints=(replace(lift, kind="prismatic"), *others), axis=axis)
-        )
+        axis, X_PF = np.vstack([context.arm.axis[0], context.arm.axis[:2]]), context.arm.X_PF.copy()
+        if turned:
+            # the column's frame lies on its side, and what it carries stands upright again
+            R = Rotation.from_euler("x", 1.1).as_matrix()
+            X_PF[0, :3, :3], X_PF[1, :3, :3], axis[0] = R, R.T, R.T @ axis[0]
+        joints = (replace(lift, kind="prismatic"), *others)
+        context = replace(context, arm=replace(context.arm, joints=joints, axis=axis, X_PF=X_PF))
     assert unshown_axes(context.arm)[0] == column
     other = np.array(context.inertial)
     other[10 * column + 1 : 10 * column + 4] -= 0.5 * moment
