@@ -365,49 +365,10 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
         assert set(np.argwhere(asked[-1][1])[:, 1].tolist()) == joints
 
 
-class TestReversals:
-    def test_a_mean_beyond_chance(self) -> None:
-        # four values with deviation 1: t(3) exceeds 9.22 by that chance; error 1/2
-        spread = np.array([1.0, 1.0, -1.0, -1.0]) * np.sqrt(3) / 2
-        assert reversals._positive(spread + 4.63) and not reversals._positive(spread + 4.58)
-        assert not reversals._positive(-spread - 9.0)
+class TestNamed:
+    """Which of the listed effects is named."""
 
-    def view(self) -> _View:
-        joint = np.repeat([0, 1, 2], 20)
-        block = np.tile(np.repeat(np.arange(5), 4), 3)
-        rows = np.arange(60) % 2 == 0
-        rows[40:] = False
-        return _View(rows, joint, block, np.array([4.0, 1.0, 1.0]), np.zeros(3))
-
-    def fit(self, *size: float) -> Any:
-        held = np.repeat(np.array(size), 20)
-        held[1::2] += 0.1  # what is no reversal counts for the whole alone
-        return SimpleNamespace(stacked=SimpleNamespace(joints=3), held_out=held)
-
-    def test_suspects_have_enough_reversals_and_a_noticeable_error(self) -> None:
-        view = self.view()
-        np.testing.assert_allclose(view.mean_squares(self.fit(2.0, 3.0, 5.0)), [4.0, 9.0, np.nan])
-        assert view.suspects(self.fit(2.0, 3.0, 5.0)) == [1]
-        assert view.suspects(self.fit(2.1, 3.0, 5.0)) == [0, 1]
-        view = self.view()
-        view.rows[20:24] = False
-        assert view.suspects(self.fit(2.1, 3.0, 5.0)) == [0, 1]  # four blocks
-        view = self.view()
-        view.rows[20:28] = False
-        assert view.suspects(self.fit(2.1, 3.0, 5.0)) == [0]
-
-    def test_gains(self) -> None:
-        view, current = self.view(), self.fit(5.0, 3.0, 0.0)
-        gains = view.gains(current, self.fit(4.0, 1.0, 0.0))
-        assert gains[0].share == pytest.approx(9 / 25) and gains[1].share == pytest.approx(8 / 9)
-        np.testing.assert_allclose(gains[0].ratios, np.full(5, np.log((25 + 4) / (16 + 4))))
-        # hardly noticeable: 25 - 22.09 < 4, and 25 - 21.16 is not either; 25 - 20.25 is
-        assert [view.gains(current, self.fit(x, 1.0, 0.0))[0].share for x in (4.7, 4.6)] == [0.0, 0.0]
-        assert view.gains(current, self.fit(4.5, 1.0, 0.0))[0].share == pytest.approx(1 - 20.25 / 25)
-        assert view.gains(current, None) == view.gains(current, current) == {}
-        assert view.gains(current, self.fit(1.0, 1.0, 9.0)) == {}  # the run as a whole does not gain
-
-    PLAIN, SURE = _Gain(0.8, np.full(5, 1.0) + 0.01 * np.arange(5)), np.full(5, 1.0) + 0.01 * np.arange(5)
+    SURE = np.full(5, 1.0) + 0.01 * np.arange(5)
 
     def best(self, *given: tuple[str, int | None, float], **of: Any) -> Any:
         gains = _Gains({}, {}, set(of.get("found", ())))
@@ -444,11 +405,3 @@ class TestReversals:
         assert self.best((name, 1, 0.9), ratios=few) is None
         assert self.best((name, 1, 0.9), (name, 2, 0.8), ratios=few).effect.joint == 1
         assert self.best((name, 1, 0.9), ("joint_spring", 2, 0.8), ratios=few) is None
-
-    def test_what_depends_on_joints_where_something_was_found_is_forgotten(self) -> None:
-        gains = _Gains({}, {}, set())
-        asked: list[Effect] = [listed("joint_spring", 1), listed("joint_spring", 2), listed("payload", None)]
-        for each in asked:
-            gains.take(each, {0: self.PLAIN})
-        gains.forget(asked[0], {0})
-        assert list(gains.by_effect) == [asked[1]] and gains.found == {"joint_spring"}
