@@ -1,14 +1,24 @@
 """`armloop excite` as a user meets it: files, answers, and one line where the input is at fault."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from answers import answered
 
+import armloop
 from armloop.cli import main
 from armloop.experiment.excitation import read_reference
+from armloop.laws.effects import Estimate, effect
+from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.robot.arm import load_arm
+from armloop.robot.kinematics import nominal_parameters
+from armloop.util.errors import InputError
 from armloop.util.resources import urdf_path
+from armloop.watch.fleet import model_and_digest
 
 QUICK = ["--library", "rigid-body", "--duration", "6", "--starts", "1", "--random", "4"]
 
@@ -81,3 +91,39 @@ def test_a_urdf_without_effort_limits(tmp_path: Path, capsys: pytest.CaptureFixt
     reference = read_reference(out, 3)
     assert np.abs(reference.q).max() <= 1 and np.abs(reference.v).max() <= 1
     assert np.abs(reference.vdot).max() <= 2
+
+
+@pytest.fixture
+def model() -> ReconstructedModel:
+    arm = load_arm("three_axis")
+    body = RigidBody(nominal_parameters(arm), (), np.zeros(0))
+    return ReconstructedModel(arm, (body,), FrictionLaw(((FrictionTerm("sign", 1.0),),) * 3))
+
+
+def test_the_drives_give_what_they_give_whatever_a_faulty_sensor_says(
+    model: ReconstructedModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    faulty = model.with_effects([AddedEffect(effect("torque_gain", 2), {"gain": Estimate(0.5, 0.0, "1")})])
+    used = []
+    for name, one in (("whole", model), ("faulty", faulty)):
+        one.save(tmp_path / f"{name}.json")
+        files = ["--model", str(tmp_path / f"{name}.json"), "--out", str(tmp_path / f"{name}.csv")]
+        assert main(["excite", "three_axis", "--json", *files, *QUICK]) == 0
+        used.append(answered(capsys.readouterr().out, "excitation")["use"]["torque"])
+        found = armloop.excite("three_axis", model=one, library="rigid-body", duration=6, starts=1, random=4)
+        used.append(found.to_dict()["use"]["torque"])
+    assert used[1:] == 3 * used[:1]
+
+
+def test_currents_are_no_torques(
+    model: ReconstructedModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    amperes = replace(model, recorded={"unit": "A", "drive_gains": None})
+    amperes.save(tmp_path / "amperes.json")
+    files = ["--model", str(tmp_path / "amperes.json"), "--out", str(tmp_path / "r.csv")]
+    assert main(["excite", "three_axis", *files, *QUICK]) == 2
+    assert "predicts motor currents (A)" in capsys.readouterr().err and not (tmp_path / "r.csv").exists()
+    with pytest.raises(InputError, match=r"predicts motor currents \(A\)"):
+        armloop.excite("three_axis", model=amperes, library="rigid-body", duration=6)
+    with pytest.raises(InputError, match=r"amperes\.json: predicts motor currents \(A\)"):
+        model_and_digest(tmp_path / "amperes.json")

@@ -168,6 +168,18 @@ def test_of_friction_that_fades_the_drake_program_has_a_clock(tmp_path):
 
 
 @pytest.mark.slow
+def test_what_the_drake_program_leaves_out_of_a_record_and_of_one_run_is_said_once(tmp_path):
+    drift = ("torque_drift", 1, {"rate": 0.01, "time_constant": 60.0, "offset": 0.1})
+    push = ("external_torque", 2, {"start": 1.0, "end": 2.0, "torque": 3.0})
+    found = export(
+        model_of(ARMS["three_axis"], friction=PLAIN, effects=(drift, push)), "drake", tmp_path / "arm"
+    )
+    assert found.missing == [
+        "torque_drift at joint 1: a fault of the record",
+        "external_torque at joint 2: an event of one run",
+    ]
+
+
 def test_the_drake_program_has_all_of_the_model(tmp_path):
     model = model_of(ARMS["three_axis"], friction=RICH, effects=(*EFFECTS, *SUBTLE))
     found = export(model, "drake", tmp_path / "arm")

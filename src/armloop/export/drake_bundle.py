@@ -88,6 +88,7 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
     if any(a.effect.name == "transmission_coupling" for a in model.effects):
         missing.append("the inertia of a motor that two joints share")
     missing += [f"{a.effect.label()}: a fault of the record" for a in model.effects if a.effect.sensor]
+    missing += [f"{a.effect.label()}: an event of one run" for a in model.effects if a.effect.event]
     missing += [
         f"{a.effect.label()}: the program's clock starts with the joint; the whole model here is that of a warm one"
         for a in model.effects
