@@ -13,6 +13,7 @@ import pytest
 
 from armloop.diagnosis.diagnose import Diagnosis, diagnose
 from armloop.diagnosis.unlisted import Unlisted
+from armloop.model import ReconstructedModel
 from armloop.util.errors import InputError
 from armloop.util.finite import finite
 
@@ -140,7 +141,7 @@ class Answers:
 def judged(jobs: int | None = None) -> Any:
     """The diagnosis of a log of three joints."""
     model: Any = SimpleNamespace(
-        in_amperes=False,
+        require_torques=lambda: None,
         arm=SimpleNamespace(n=3, name="arm", joints=()),
         conditioning=None,
         with_effects=lambda added: ("with", *added),
@@ -228,13 +229,14 @@ def test_the_account_with_a_load_takes_the_place_of_that_without(monkeypatch: py
 
 def test_logs_of_other_joints_and_motor_currents_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     Answers(monkeypatch)
-    arm = SimpleNamespace(n=3, name="arm")
-    for currents, joints, says in (
-        (True, 3, "reconstruct it with --drive-gains"),
-        (False, 2, "run: 2 joints, but the model's arm arm has 3"),
-        (False, 4, "run: 4 joints"),
+    arm: Any = SimpleNamespace(n=3, name="arm")
+    law: Any = None
+    for unit, joints, says in (
+        ("A", 3, "the model predicts motor currents.*reconstruct it with --drive-gains"),
+        ("N*m", 2, "run: 2 joints, but the model's arm arm has 3"),
+        ("N*m", 4, "run: 4 joints"),
     ):
-        model: Any = SimpleNamespace(in_amperes=currents, arm=arm)
+        model = ReconstructedModel(arm, (), law, recorded={"unit": unit, "drive_gains": None})
         logs: Any = [SimpleNamespace(name="run", joints=joints)]
         with pytest.raises(InputError, match=says):
             diagnose(model, logs)

@@ -206,7 +206,16 @@ class ReconstructedModel:
         Y = full_columns(self.arm, part, rotors=True).reshape(-1, 11 * n)
         nominal = np.concatenate([nominal_parameters(self.arm), np.zeros(n)])
         rest = self.rigid_body(part).ravel() - Y @ nominal
-        found = nominal + np.linalg.lstsq(Y, rest, rcond=1e-4)[0]
+        change, turns = np.zeros(11 * n), np.ones(11 * n, dtype=bool)
+        while True:
+            change[turns] = np.linalg.lstsq(Y[:, turns], rest, rcond=1e-4)[0]
+            less = turns & (change < 0) & (np.arange(11 * n) >= 10 * n)
+            if not less.any():
+                break
+            # A motor's inertia takes nothing away from that of its link.
+            turns &= ~less
+            change[less] = 0.0
+        found = nominal + change
         return found[: 10 * n], found[10 * n :]
 
     def feedforward(
