@@ -14,6 +14,7 @@ from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
 from armloop.identification.reconstruction.readings import Reading, meant, readings
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.robot.arm import load_arm
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import LogError
 
 
@@ -35,7 +36,14 @@ def arm_of(kinds: str) -> Any:
 
 
 def orders(kinds: str) -> list[list[int]]:
-    return [reading.order.tolist() for reading in readings(arm_of(kinds)) if not reading.unit]
+    return [
+        reading.order.tolist() for reading in readings(arm_of(kinds)) if not (reading.unit or reading.turned)
+    ]
+
+
+def turned(log: MotionLog, joints: tuple[int, ...]) -> MotionLog:
+    """A record whose joints count in the other direction."""
+    return Reading(np.arange(log.joints), turned=joints).of(log, arm_of("R" * log.joints))
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -53,6 +61,61 @@ def test_orders_and_units_are_named(seed: int, dry: float) -> None:
     for factor, unit in ((1 / (2 * np.pi), "revolutions"), (180 / np.pi, "degrees")):
         with pytest.raises(LogError, match=rf"angles seem to be in {unit}: .* times as well; give q in rad"):
             check_torques([misread(log, [0, 1, 2], factor)], arm, 10.0)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("joints", "words"),
+    [
+        ((1,), r"joint 2 counts in the direction against the URDF's axis: .* times as well; give them so"),
+        ((2,), r"joint 3 counts in the direction against"),
+        # the first joint is upright: which way it counts is nothing that its torques tell
+        ((0,), ""),
+        ((0, 2), r"joint 3 counts in the direction against"),
+        # its mirror image
+        (
+            (1, 2),
+            r"mounted otherwise .* gravity along \(-?0\.0., -?0\.0., 1\.00\) .*; or joints 2, 3 count against",
+        ),
+    ],
+)
+def test_joints_that_count_the_other_way_are_named(seed: int, joints: tuple[int, ...], words: str) -> None:
+    log = turned(run(seed, 1.0), joints)
+    if not words:
+        check_torques([log], three_axis(), 10.0)
+        return
+    with pytest.raises(LogError, match=words):
+        check_torques([log], three_axis(), 10.0)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("down", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.5, 0.3, -0.81), (0.0, 0.8, 0.6)])
+def test_the_direction_of_gravity_is_found(seed: int, down: tuple[float, float, float]) -> None:
+    motion = fourier_motion(30.0, 100.0, seed)
+    mounted = replace(three_axis(), gravity=9.81 * np.array(down) / np.linalg.norm(down))
+    log = measured(motion, rigid_torque(mounted, motion.q, motion.v, motion.vdot) + friction(motion.v), seed)
+    check_torques([log], mounted, 10.0)
+    with pytest.raises(LogError, match="the arm seems to be mounted otherwise than its URDF says") as said:
+        check_torques([log], three_axis(), 10.0)
+    found = np.array([float(x) for x in str(said.value).split("along (")[1].split(")")[0].split(", ")])
+    np.testing.assert_allclose(found, np.array(down) / np.linalg.norm(down), atol=0.03)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_laws_as_strong_as_gravity_are_no_other_reading(seed: int) -> None:
+    """Ripple, a spring between joints, a coupled wrist's friction, and one joint's speed as another's friction."""
+    motion = fourier_motion(30.0, 100.0, seed)
+    q, v, arm = motion.q, motion.v, three_axis()
+    tau = rigid_torque(arm, q, v, motion.vdot) + friction(v)
+    size = np.sqrt(np.mean(tau**2, axis=0))
+    wrist = np.tanh(10 * (v[:, 1] + v[:, 2]))
+    for law in (
+        np.sin(3 * q),
+        np.column_stack([np.sin(q[:, 1] - q[:, 2]), 0 * wrist, 0 * wrist]),
+        np.column_stack([0 * wrist, wrist, wrist]),
+        q[:, [1, 2, 0]] * v,
+    ):
+        check_torques([measured(motion, tau + size * law, seed)], arm, 10.0)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -85,6 +148,10 @@ def test_measured_records_are_taken_as_they_stand_and_misread_ones_are_not(measu
         for order, factor, words in misreadings:
             with pytest.raises(LogError, match=words):
                 check_torques([misread(log, order, factor)], arm, 8.0)
+        with pytest.raises(LogError, match="joint 2 counts in the direction against"):
+            check_torques([turned(log, (1,))], arm, 8.0)
+        with pytest.raises(LogError, match=r"gravity along \(-?0\.0., -?0\.0., -1\.00\)"):
+            check_torques([log], replace(arm, gravity=np.array([9.81, 0.0, 0.0])), 8.0)
 
 
 def test_small_arms_are_read_in_every_order_of_the_same_kinds_and_larger_ones_in_likely_orders() -> None:
@@ -124,50 +191,108 @@ def fit_of(relative: list[float], faults: int = 0) -> Fit:
 
 
 class Given:
-    """Fits that are given, in the order in which they are asked for."""
+    """A record whose other readings leave what is given, by what they are; or none where there is too little motion."""
 
-    def __init__(self, fits: list[Fit | None]) -> None:
-        self.fits = iter(fits)
+    def __init__(self, plain: Fit, others: dict[str, Fit]) -> None:
+        self.plain, self.others = plain, others
+        self.arm = arm_of("R" * len(plain.relative))
 
-    def of(self, logs: list[MotionLog], arm: object, cutoff_hz: float, unit: Any) -> Any:
-        fit = next(self.fits)
+    def of(self, logs: list[MotionLog], arm: object, cutoff_hz: float, unit: Array) -> Any:
+        return self._left("turns" if unit[0] > 1 else "degrees")
+
+    def read(self, order: Index, signs: Array) -> Any:
+        turned = ", ".join(str(j + 1) for j in np.flatnonzero(signs < 0))
+        return self._left(turned or "order") or self._left("plain")
+
+    def sprung(self) -> Any:
+        return self._left("springs") or self._left("plain")
+
+    def under(self, down: Array) -> Any:
+        return (self._left("up") if down[2] > 0.99 else None) or self._left("plain")
+
+    def _left(self, reading: str) -> Any:
+        fit = self.plain if reading == "plain" else self.others.get(reading)
         return None if fit is None else SimpleNamespace(fit=lambda signs, order: fit)
 
 
-def chosen(plain: Fit, others: list[Fit | None], monkeypatch: pytest.MonkeyPatch) -> Any:
-    """What of revolutions, degrees and the other order of two joints is meant."""
-    monkeypatch.setattr(PlainFits, "of", Given(others).of)
-    q = np.zeros((3, 2))
+def chosen(plain: Fit, others: dict[str, Fit], monkeypatch: pytest.MonkeyPatch) -> str:
+    """What is said of a record of two joints."""
+    given: Any = Given(plain, others)
+    monkeypatch.setattr(PlainFits, "of", given.of)
+    q = np.zeros((3, len(plain.relative)))
     log = unchecked_log(time=np.arange(3.0), q=q, v=q, tau=q, name="run")
-    found = meant([log], arm_of("RR"), 10.0, plain)
-    return None if found is None else (found[0].unit or found[0].order.tolist(), pytest.approx(found[1]))
+    return meant(given, [log], 10.0, plain)
 
 
 @pytest.mark.parametrize(
-    ("plain", "others", "found"),
+    ("plain", "others", "said"),
     [
         # an order must be three times as good in the geometric mean; a unit by half
-        (fit_of([0.3, 0.2]), [None, None, fit_of([0.1, 0.066])], ([1, 0], np.sqrt(0.06 / 0.0066))),
-        (fit_of([0.3, 0.2]), [None, None, fit_of([0.1, 0.067])], None),
-        (fit_of([0.3, 0.2]), [fit_of([0.2, 0.13]), None, None], ("revolutions", np.sqrt(0.06 / 0.026))),
-        (fit_of([0.3, 0.2]), [None, fit_of([0.2, 0.134]), None], None),
-        # of several the best
-        (fit_of([0.3, 0.2]), [fit_of([0.1, 0.1]), fit_of([0.05, 0.1]), fit_of([0.1, 0.1])],
-         ("degrees", np.sqrt(0.06 / 0.005))),
+        (fit_of([0.3, 0.2]), {"order": fit_of([0.1, 0.066])}, "joints 1 and 2 are exchanged"),
+        (fit_of([0.3, 0.2]), {"order": fit_of([0.1, 0.067])}, ""),
+        (fit_of([0.3, 0.2]), {"turns": fit_of([0.2, 0.13])}, "revolutions: read so all torques are explained 1.5 times"),
+        (fit_of([0.3, 0.2]), {"degrees": fit_of([0.2, 0.134])}, ""),
+        # a direction: the best joint twice, all by a fifth, none worse by more than a fifth
+        (fit_of([0.3, 0.2]), {"2": fit_of([0.3, 0.099])}, "joint 2 counts"),
+        (fit_of([0.3, 0.2]), {"2": fit_of([0.3, 0.101])}, ""),
+        (fit_of([0.3, 0.2]), {"2": fit_of([0.37, 0.06])}, "joint 2 counts"),
+        (fit_of([0.3, 0.2]), {"2": fit_of([0.38, 0.06])}, ""),
+        (fit_of([0.2] * 8), {"2": fit_of([0.2] * 7 + [0.04])}, "joint 2 counts"),
+        (fit_of([0.2] * 8), {"2": fit_of([0.2] * 7 + [0.05])}, ""),
+        # and better than with springs
+        (fit_of([0.3, 0.2]), {"2": fit_of([0.1, 0.1]), "springs": fit_of([0.1, 0.101])}, "joint 2 counts"),
+        (fit_of([0.3, 0.2]), {"2": fit_of([0.1, 0.1]), "springs": fit_of([0.1, 0.099])}, ""),
+        (fit_of([0.3, 0.2]), {"turns": fit_of([0.1, 0.1]), "springs": fit_of([0.1, 0.099])}, "revolutions"),
+        # of several the best, of those that are as good the simplest
+        (fit_of([0.3, 0.2]), {"turns": fit_of([0.1, 0.1]), "degrees": fit_of([0.05, 0.1])}, "degrees"),
+        (fit_of([0.3, 0.2]), {"2": fit_of([0.1, 0.1]), "1, 2": fit_of([0.1, 0.096])}, "joint 2 counts"),
+        (fit_of([0.3, 0.2]), {"2": fit_of([0.1, 0.1]), "1, 2": fit_of([0.1, 0.088])}, "joints 1, 2 count"),
         # it may not be less physical than the record as it stands, and must be good for something
-        (fit_of([0.3, 0.2], 1), [fit_of([0.1, 0.1], 1), None, None], ("revolutions", np.sqrt(6.0))),
-        (fit_of([0.3, 0.2], 1), [fit_of([0.1, 0.1], 2), None, None], None),
-        (fit_of([1.9, 1.9]), [fit_of([0.59, 0.1]), None, None], ("revolutions", np.sqrt(1.9**2 / 0.059))),
-        (fit_of([1.9, 1.9]), [fit_of([0.61, 0.1]), None, None], None),
+        (fit_of([0.3, 0.2], 1), {"turns": fit_of([0.1, 0.1], 1)}, "revolutions"),
+        (fit_of([0.3, 0.2], 1), {"turns": fit_of([0.1, 0.1], 2)}, ""),
+        (fit_of([1.9, 1.9]), {"turns": fit_of([0.59, 0.1])}, "revolutions"),
+        (fit_of([1.9, 1.9]), {"turns": fit_of([0.61, 0.1])}, ""),
     ],
 )  # fmt: skip
 def test_a_reading_must_explain_far_more(
-    plain: Fit, others: list[Fit | None], found: Any, monkeypatch: pytest.MonkeyPatch
+    plain: Fit, others: dict[str, Fit], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert chosen(plain, others, monkeypatch) == found
+    found = chosen(plain, others, monkeypatch)
+    assert said in found and bool(said) == bool(found)
 
 
 def test_what_is_explained_well_is_not_asked_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    better = [fit_of([0.001, 0.001])] * 3
-    assert chosen(fit_of([0.01, 0.029]), better, monkeypatch) is None
-    assert chosen(fit_of([0.01, 0.031]), better, monkeypatch) is not None
+    better = {"turns": fit_of([0.001, 0.001])}
+    assert chosen(fit_of([0.01, 0.029]), better, monkeypatch) == ""
+    assert "revolutions" in chosen(fit_of([0.01, 0.031]), better, monkeypatch)
+
+
+def test_an_arm_that_hangs_may_be_its_mirror_image(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, hangs = fit_of([0.3, 0.2]), fit_of([0.1, 0.1])
+    said = chosen(plain, {"up": hangs, "1, 2": fit_of([0.1, 0.1])}, monkeypatch)
+    assert "gravity along (0.00, 0.00, 1.00)" in said and said.endswith(
+        "; or joints 1, 2 count against the URDF's axes"
+    )
+    assert said.count("; or") == 1
+    assert "; or" not in chosen(plain, {"up": hangs}, monkeypatch)
+
+
+@pytest.mark.parametrize(("joints", "sets"), [(2, 3), (6, 63), (7, 127), (8, 8 + 28)])
+def test_small_arms_are_read_with_every_set_of_joints_turned(joints: int, sets: int) -> None:
+    found = [reading.turned for reading in readings(arm_of("R" * joints)) if reading.turned]
+    assert len(set(found)) == len(found) == sets
+
+
+def test_columns_read_otherwise_are_those_of_the_log_read_so() -> None:
+    arm, log, steady = three_axis(), run(3, 1.0), np.ones(3)
+    for reading in (Reading(np.array([2, 0, 1])), Reading(np.arange(3), turned=(0, 2))):
+        whole = PlainFits.of([reading.of(log, arm)], arm, 10.0)
+        plain = PlainFits.of([log], arm, 10.0)
+        assert whole is not None and plain is not None
+        read = reading.problem(plain, [log], 10.0)
+        assert read is not None
+        for part in ("columns", "tau", "moving"):
+            np.testing.assert_allclose(getattr(read.table, part), getattr(whole.table, part), atol=1e-9)
+        mine, other = (one.fit(steady, np.arange(3)) for one in (read, whole))
+        np.testing.assert_allclose(mine.relative, other.relative, rtol=1e-6)
+        np.testing.assert_allclose(mine.inertia, other.inertia, rtol=1e-6)

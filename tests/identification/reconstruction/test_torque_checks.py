@@ -366,7 +366,10 @@ def small_problem() -> torque_checks.Problem:
         columns[:, j, 2 + 3 * j : 5 + 3 * j] = np.column_stack([np.sign(v), v, np.ones(N)])
     tau = columns @ np.arange(1.0, 9.0) + rng.normal(size=(N, 2)) * [0.5, 5.0]
     table = Table(columns, tau, np.arange(N) // 5, rng.random((N, 2)) > 0.2, standing(N, 2), 1)
-    return torque_checks.Problem(table, np.ones((1, 2, 2, 2)), 2)
+    arm, base = SimpleNamespace(n=2), SimpleNamespace(count=2)
+    problem: Any = torque_checks.Problem(arm, base, table, np.zeros((1, 2)))  # type: ignore[arg-type]
+    problem.__dict__["mass"] = np.ones((1, 2, 2, 2))
+    return problem
 
 
 @pytest.mark.parametrize("half", [None, 0, 1])

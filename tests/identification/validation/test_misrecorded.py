@@ -49,6 +49,14 @@ def test_units_signs_and_orders_are_told(model: ReconstructedModel, seed: int) -
         "all torques are about 5 times what the model gives; give"
     )
     assert said(model, replace(log, tau=-log.tau)).startswith("the sign of all joints' tau is turned")
+    elbow = np.array([1.0, -1.0, 1.0])
+    other = replace(log, q=elbow * log.q, v=elbow * log.v)
+    assert said(model, replace(other, tau=elbow * log.tau)).startswith(
+        "joint 2 counts in the direction against the model's: with q, v and tau of the other sign the model explains"
+    )
+    assert said(model, other).startswith(
+        "joint 2 counts in the direction against the model's and tau's: with q and v of the other sign the model explains"
+    )
     assert said(model, exchanged(log, [2, 1, 0], True)).startswith(
         "joints are in another order: taken as 3, 2, 1"
     )
@@ -91,11 +99,17 @@ def test_a_reading_takes_signals_torques_and_what_slides_of_the_columns_it_is_of
     samples = preprocess([run(5, 12.0)], model.conditioning)
     samples = replace(samples, moving=samples.moving & [True, False, True])
     order = np.array([1, 2, 0])
-    made = misrecorded_module._read(samples, Reading(order, "degrees"), model.arm)
+    made = misrecorded_module._read(samples, Reading(order, "degrees"), model.arm, True)
     for key in ("q", "v", "vdot"):
         expected = np.pi / 180 * getattr(samples.motion, key)[:, order]
         np.testing.assert_allclose(getattr(made.motion, key), expected)
     assert (made.tau == samples.tau[:, order]).all() and (made.moving == samples.moving[:, order]).all()
+    turned = Reading(order, turned=(0, 2))
+    signs = [-1, 1, -1]
+    for torques, tau in ((True, signs * samples.tau[:, order]), (False, samples.tau)):
+        made = misrecorded_module._read(samples, turned, model.arm, torques)
+        assert (made.tau == tau).all() and (made.moving == samples.moving[:, order]).all()
+        assert (made.motion.v == signs * samples.motion.v[:, order]).all()
 
 
 def test_joints_that_an_exchange_leaves_alone_need_not_become_better() -> None:

@@ -6,7 +6,8 @@ It is what every check of a record begins with, quick enough to be asked of the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -23,7 +24,7 @@ from armloop.identification.reconstruction.bandwidth import (
 )
 from armloop.identification.reconstruction.physical import POSTURES
 from armloop.identification.reconstruction.rigid_body import mass_columns
-from armloop.robot.arm import Arm
+from armloop.robot.arm import STANDARD_GRAVITY, Arm
 from armloop.util.arrays import Array, Index, Mask
 
 #: Least part of the torque that friction must be for its power to count.
@@ -69,11 +70,12 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class PlainFits:
-    """Columns and torques at a few instants, and mass matrices per unit of each parameter (P, n, n, r)."""
+    """Columns and torques of an arm at a few instants, and postures (P, n) of the record."""
 
+    arm: Arm
+    base: BaseParameters
     table: Table
-    mass: Array
-    shared: int
+    postures: Array
 
     @classmethod
     def of(
@@ -85,12 +87,45 @@ class PlainFits:
         if table is None or (table.moving.sum(axis=0) < _FEWEST).any():
             return None
         q = np.concatenate([log.q for log in logs])
-        q = q[:: max(1, len(q) // POSTURES)]
-        return cls(table.every(_EVERY), mass_columns(arm, base, q), base.count)
+        return cls(arm, base, table.every(_EVERY), q[:: max(1, len(q) // POSTURES)])
+
+    @cached_property
+    def mass(self) -> Array:
+        """(P, n, n, r) mass matrices per unit of each parameter."""
+        return mass_columns(self.arm, self.base, self.postures)
+
+    def read(self, order: Index, signs: Array) -> Self:
+        """The same with the columns of joint ``order[k]`` in place k, q, v and tau of each times its sign."""
+        table, r = self.table, self.base.count
+        q, v, vdot = (signs * x[:, order] for x in (table.motion.q, table.motion.v, table.motion.vdot))
+        motion = replace(table.motion, q=q, v=v, vdot=vdot)
+        columns = np.zeros_like(table.columns)
+        columns[:, :, :r] = self.base.columns(self.arm, motion)
+        for j, source in enumerate(order):
+            own, its = (slice(r + 3 * k, r + 3 * k + 3) for k in (j, source))
+            columns[:, j, own] = table.columns[:, source, its] * [signs[j], signs[j], 1.0]
+        tau, moving = signs * table.tau[:, order], table.moving[:, order]
+        read = replace(table, columns=columns, tau=tau, moving=moving, motion=motion)
+        return replace(self, table=read, postures=signs * self.postures[:, order])
+
+    def under(self, down: Array) -> Self:
+        """The same with gravity in another direction (3,), a unit vector in the base frame."""
+        arm = replace(self.arm, gravity=float(np.linalg.norm(STANDARD_GRAVITY)) * down)
+        base, table, dry = BaseParameters.of_arm(arm, rotors=True), self.table, self.base.count
+        friction = table.columns[:, :, dry:]
+        columns = np.concatenate([base.columns(arm, table.motion), friction], axis=2)
+        return replace(self, arm=arm, base=base, table=replace(table, columns=columns))
+
+    def sprung(self) -> Self:
+        """The same with a spring at every joint."""
+        q = self.table.motion.q[:, :, None] * np.eye(self.arm.n)
+        return replace(
+            self, table=replace(self.table, columns=np.concatenate([self.table.columns, q], axis=2))
+        )
 
     def fit(self, signs: Array, order: Index, half: int | None = None) -> Fit:
         """Regress the torques with these signs in this order, of all blocks or of every other one."""
-        table, n, r = self.table, len(signs), self.shared
+        table, n, r = self.table, len(signs), self.base.count
         tau = signs * table.tau[:, order]
         rows = table.moving if half is None else table.moving & (table.blocks % 2 == half)[:, None]
         scale = table.sizes(tau, rows)

@@ -61,9 +61,8 @@ def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> None
             f"{names}: the torques do not fit one another: tau{j + 1} is about {float(f'{1 / factor:.2g}'):g} times what "
             "the links give that explain the other joints; check the units and drive gains of all joints"
         )
-    if other := meant(chosen, arm, cutoff_hz, plain):
-        reading, times = other
-        raise LogError(f"{names}: {reading.words(times)}")
+    if wrong := meant(problem, chosen, cutoff_hz, plain):
+        raise LogError(f"{names}: {wrong}")
 
 
 class Problem(PlainFits):

@@ -1,5 +1,5 @@
-"""Gross-error check of logs against a model: torques in another unit or of the other sign, joints in another order, angles
-in another unit.
+"""Gross-error check of logs against a model: torques in another unit or of the other sign, joints in another order or
+counted in the other direction, angles in another unit.
 
 No effect on an arm multiplies all torques by one factor far from one, or makes the model right for the columns of other
 joints; a diagnosis would name whatever fits such a log least badly.
@@ -15,7 +15,7 @@ import numpy as np
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
 from armloop.identification.reconstruction.plain_fits import FAR
-from armloop.identification.reconstruction.readings import Reading, readings
+from armloop.identification.reconstruction.readings import AS_GOOD, Reading, readings
 from armloop.identification.scoring import residual, score_errors
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
@@ -24,6 +24,8 @@ from armloop.util.arrays import TINY, Array
 #: A joint's relative error from which on a log is asked, and the part of each joint's, at most, that what it may mean must
 #: leave of it, but for what the model leaves on its own data as well: two columns that are exchanged leave others as good.
 _POOR, _BETTER = 0.5, 0.3
+#: Instants at which readings are compared, and how many that do best are asked of all samples.
+_SCREENED, _VERIFIED = 2000, 3
 #: A factor of all torques is far from one, or negative; one of minus one, to this ratio, is a sign.
 _SIGN = 1.3
 #: What a factor of torques in N·m would be, if it is as near as this ratio.
@@ -52,7 +54,7 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
     gain = _common_gain(samples, predicted)
     if gain and _far_better(left, _relative(samples.tau - gain * predicted, samples), usual):
         return _factor(gain, "A" if model.in_amperes else "N·m (N)")
-    for words, other in _read_otherwise(samples, model.arm):
+    for words, other in _likely(model, samples):
         if _far_better(left, _relative(residual(model, other), other), _usual(model, other)):
             return words
     return ""
@@ -94,31 +96,60 @@ def _factor(gain: float, unit: str) -> str:
     return f"all torques are about {float(f'{gain:.2g}'):g} times what the model gives{guess}; give tau in {unit}"
 
 
-def _read_otherwise(samples: Samples, arm: Arm) -> Iterator[tuple[str, Samples]]:
-    """Every other reading of samples, in words and as they would be; of torques and motion, or of the motion alone."""
+def _likely(model: ReconstructedModel, samples: Samples) -> list[tuple[str, Samples]]:
+    """The readings that explain about as much as the best does, told at a few instants, the simplest first."""
+    every = slice(None, None, max(1, samples.motion.samples // _SCREENED))
+    some = replace(
+        samples,
+        motion=samples.motion.take(every),
+        tau=samples.tau[every],
+        moving=samples.moving[every],
+        spans=None,
+        unknown=None,
+    )
+    asked = list(_read_otherwise(model.arm))
+    left = []
+    for reading, torques, _ in asked:
+        other = _read(some, reading, model.arm, torques)
+        relative = _relative(other.tau - model.predict(other.motion), other)
+        left.append(float(np.exp(np.mean(np.log(np.maximum(relative, TINY))))))
+    near = [one for one, error in zip(asked, left, strict=True) if AS_GOOD * error <= min(left)]
+    return [
+        (words, _read(samples, reading, model.arm, torques)) for reading, torques, words in near[:_VERIFIED]
+    ]
+
+
+def _read_otherwise(arm: Arm) -> Iterator[tuple[Reading, bool, str]]:
+    """Every other reading, whether it is of the torques, too, or of the motion alone; and its words."""
     for reading in readings(arm):
         if reading.unit:
+            yield reading, True, f"angles seem to be in {reading.unit}; give q in rad and v in rad/s"
+        elif reading.turned:
+            which = reading.which()
+            better = "of the other sign the model explains the log; give them as in the model's logs"
+            yield reading, True, f"{which} in the direction against the model's: with q, v and tau {better}"
             yield (
-                f"angles seem to be in {reading.unit}; give q in rad and v in rad/s",
-                _read(samples, reading, arm),
+                reading,
+                False,
+                f"{which} in the direction against the model's and tau's: with q and v {better}",
             )
-            continue
-        order = f"taken as {', '.join(str(k + 1) for k in reading.order)}, base to tip, the model explains the log"
-        whole = _read(samples, reading, arm)
-        yield f"joints are in another order: {order}; number them from the base to the tip", whole
-        yield (
-            f"q and v are those of other joints than tau: {order}; put all columns in one order",
-            replace(whole, tau=samples.tau),
-        )
+        else:
+            order = f"taken as {', '.join(str(k + 1) for k in reading.order)}, base to tip, the model explains the log"
+            yield reading, True, f"joints are in another order: {order}; number them from the base to the tip"
+            yield (
+                reading,
+                False,
+                f"q and v are those of other joints than tau: {order}; put all columns in one order",
+            )
 
 
-def _read(samples: Samples, reading: Reading, arm: Arm) -> Samples:
+def _read(samples: Samples, reading: Reading, arm: Arm, torques: bool) -> Samples:
     """Filters treat every column alike, so that what passed them can be read otherwise as well as the record."""
-    motion, scale, order = samples.motion, reading.scale(arm), reading.order
+    motion, scale, order = samples.motion, reading.scale(arm) * reading.signs, reading.order
     q, v, vdot = (scale * x[:, order] for x in (motion.q, motion.v, motion.vdot))
     return replace(
         samples,
         motion=replace(motion, q=q, v=v, vdot=vdot),
-        tau=samples.tau[:, order],
+        tau=reading.signs * samples.tau[:, order] if torques else samples.tau,
         moving=samples.moving[:, order],
     )
