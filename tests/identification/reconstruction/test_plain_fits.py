@@ -1,5 +1,8 @@
 """Rigid bodies with plain friction, regressed on a record at few instants: errors, power of friction and inertia."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque, standing, three_axis
@@ -26,7 +29,9 @@ def test_errors_friction_and_inertia_of_a_fit() -> None:
     table = Table(columns, tau, np.arange(N) // 10, moving, standing(N, 2), 1)
     mass = np.zeros((3, 2, 2, 1))
     mass[:, 0, 0, 0], mass[:, 1, 1, 0] = [1.0, 2.0, 3.0], 5.0
-    problem = PlainFits(table, mass, 1)
+    arm, base = SimpleNamespace(n=2), SimpleNamespace(count=1)
+    problem: Any = PlainFits(arm, base, table, np.zeros((3, 2)))  # type: ignore[arg-type]
+    problem.__dict__["mass"] = mass
     found = problem.fit(np.ones(2), np.arange(2))
     sizes = [np.sqrt(np.mean(tau[rows, j] ** 2)) for j, rows in enumerate(moving.T)]
     np.testing.assert_allclose(found.relative, 0.1 / np.array(sizes), rtol=0.08)
