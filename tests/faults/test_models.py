@@ -43,6 +43,7 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     (("arm", "joints", 1, "upper"), ["high", None, -1e300, -9.0], r"joints\[2\]\.upper|lower below upper"),
     (("arm", "joints", 2, "velocity"), [-1.0, "fast", None, 1e300], r"joints\[3\]\.velocity"),
     (("arm", "joints", 2, "effort"), [-1.0, "strong", None], r"joints\[3\]\.effort"),
+    (("arm", "joints", 0, "damping"), [1.0], r"field 'damping' is unknown; there are: name, kind"),
     (("arm", "X_PF", 1, 0, 0), [2.0, -1.0, 1e12, 1e-300], r"arm\.X_PF\[2\] is no pose"),
     (("arm", "X_PF", 2, 3), [[0, 0, 0, 2], [1, 0, 0, 1], [0, 0, 0, 0]], r"arm\.X_PF\[3\] is no pose"),
     (("arm", "X_tool", 1, 2), [0.5, -1e12], r"arm\.X_tool is no pose"),
@@ -101,6 +102,7 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     ),
     ((*PAYLOAD, "com", "value"), [[0.0, "x", 0.0], [99.0, 0.0, 0.0], None, "x"], "com|payload"),
     ((*PAYLOAD, "com", "std_error"), [[0.1, 0.1], "x", [-1.0] * 3], "std_error|com"),
+    ((*OFFSET, "std_error"), [[], [0.1]], "std_error|one length"),
     ((*OFFSET, "value"), ["x", None, 1e300, ...], "offset|value"),
     (("conditioning",), [None, [], "x", ...], "conditioning"),
     (("conditioning", "cutoff_hz"), [-1.0, 1e-9, 1e300, "ten", None, ...], "cutoff_hz"),
@@ -111,20 +113,24 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     (("recorded", "unit"), ["lbf", None, 3, ...], "unit"),
     (("recorded", "drive_gains"), [[1.0, 2.0], [0.0] * 3, [-1.0] * 3, ["a"] * 3, 3], "drive_gains"),
     (("baseline",), [None, [], "x", ...], "baseline"),
-    (("baseline", "rmse"), [[1.0], [-1.0] * 3, ["a"] * 3, 3, [1e300] * 3], "rmse"),
+    (("baseline", "rmse"), [None, [1.0], [-1.0] * 3, ["a"] * 3, 3, [1e300] * 3], "rmse"),
+    (("baseline", "nrmse"), [None], r"baseline\.nrmse is None; it must be a list"),
+    (("baseline", "worst"), [None], r"baseline\.worst is None; it must be a list"),
+    (("baseline", "joints"), [None, "x", [{}] * 3, [{"joint": 1}], [{"joint": 1, "x": 0}] * 3], "joints"),
     (("history",), [None, [], "x", ...], "history"),
     (("history", "logs"), [3, "run", [3], {}], "logs"),
     (
         ("history", "range"),
-        [[[1.0]], [1.0] * 4, "wide", [["a"] * 3] * 4, [[-1.0] * 3] * 4, [[1.0] * 2] * 4],
+        [None, [[1.0]], [1.0] * 4, "wide", [["a"] * 3] * 4, [[-1.0] * 3] * 4, [[1.0] * 2] * 4],
         "range",
     ),
-    (("history", "slowest"), [[0.1], [0.1] * 4, [-0.1] * 3, ["a"] * 3, 0.1, [1e300] * 3], "slowest"),
-    (("history", "inertial"), [[1.0], "x", [1e300] * 30, 3], "inertial"),
+    (("history", "slowest"), [None, [0.1], [0.1] * 4, [-0.1] * 3, ["a"] * 3, 0.1, [1e300] * 3], "slowest"),
+    (("history", "inertial"), [None, [1.0], "x", [1e300] * 30, 3], "inertial"),
     (("history", "notes"), [3, [3]], "notes"),
     (
         ("history", "encoder_zeros"),
         [
+            None,
             3,
             {},
             {"spread": "wide"},
@@ -134,6 +140,7 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
         "encoder_zeros",
     ),
     (("uncertainty",), [None, [], "x"], "uncertainty"),
+    (("uncertainty", "between_logs"), [[None] * 4, [None]], "between_logs: . joints, the arm has 3"),
     (
         ("uncertainty", "friction"),
         [[{}], [{"v1": {"std_error": -1.0, "degrees_of_freedom": 3}}] * 3, 3],
@@ -157,6 +164,18 @@ TERMS: dict[str, tuple[dict[str, Any], str]] = {
     "null": ({"joints": [{"sin(q2)": None}, {}, {}]}, r"sin\(q2\) is None"),
     "too large": ({"joints": [{"sin(q2)": 1e300}, {}, {}]}, r"sin\(q2\) is 1e\+300"),
     "a long name": ({"joints": [{"s" * 1000: 1.0}, {}, {}]}, "joints"),
+}
+ENERGY = {
+    "term": "cos(q2)",
+    "coefficient": 1.0,
+    "degrees": [0, 1, 0],
+    "sine": False,
+    "speeds": [0, 0],
+}
+ENERGIES: dict[str, tuple[dict[str, Any], str]] = {
+    "degrees of two joints": ({"degrees": [0, 1]}, r"degrees of 'cos\(q2\)': 2 joints, the arm has 3"),
+    "one speed": ({"speeds": [0]}, r"terms\[1\]\.speeds is \[0\]"),
+    "a list of sines": ({"sine": [False]}, r"terms\[1\]\.sine is \[False\]; it must be true or false"),
 }
 SENSORS: dict[str, tuple[str, int | None, dict[str, float]]] = {
     "a gain of zero": ("torque_gain", 1, {"gain": 0.0}),
@@ -207,6 +226,9 @@ def cases() -> Iterator[tuple[str, Callable[[Any], None], str]]:
         yield f"twice: {name}", again(*keys), "stands twice"
     for name, (change, said) in TERMS.items():
         yield f"terms: {name}", lambda data, c=change: data["components"].append({**STEP, **c}), said
+    for name, (change, said) in ENERGIES.items():
+        energies = {"kind": "lagrangian", "terms": [ENERGY | change]}
+        yield f"energies: {name}", at("components", 0)(energies), said
     for name, (effect, joint, values) in SENSORS.items():
         parameters = {key: {"value": x, "std_error": 0.1, "unit": "1"} for key, x in values.items()}
         added = {"effect": effect, "joint": joint, "parameters": parameters}

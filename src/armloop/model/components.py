@@ -252,18 +252,16 @@ class Lagrangian:
     @staticmethod
     def from_dict(data: dict[str, Any], arm: Arm) -> Lagrangian:
         rows = data["terms"]
-        degrees = np.array([row["degrees"] for row in rows], dtype=int).reshape(len(rows), -1)
+        degrees = np.array([row["degrees"] for row in rows], dtype=int).reshape(-1, arm.n)
         speeds = np.array([row["speeds"] for row in rows], dtype=int).reshape(-1, 2) - 1
-        if len(rows) and degrees.shape[1] != arm.n:
-            raise ModelError(f"lagrangian: terms of {degrees.shape[1]} joints, the arm has {arm.n}")
         if ((speeds < -1) | (speeds >= arm.n) | ((speeds < 0) != (speeds[:, :1] < 0))).any():
             raise ModelError(
                 f"lagrangian: speeds must be two joints from 1 to {arm.n}, or 0, 0 for a term of U"
             )
-        if (degrees.reshape(-1, arm.n)[:, ~arm.revolute] < 0).any():
+        if (degrees[:, ~arm.revolute] < 0).any():
             raise ModelError("lagrangian: a prismatic joint's degree must not be negative")
-        sine = np.array([bool(row["sine"]) for row in rows])
-        energy = EnergyTerms(arm.revolute, degrees.reshape(-1, arm.n), sine, speeds)
+        sine = np.array([row["sine"] for row in rows], dtype=bool)
+        energy = EnergyTerms(arm.revolute, degrees, sine, speeds)
         return Lagrangian(energy, np.array([float(row["coefficient"]) for row in rows]))
 
 

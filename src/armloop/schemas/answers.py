@@ -15,10 +15,9 @@ from armloop.schemas.types import (
     PerJoint,
     PerJointOrNull,
     Seconds,
+    Share,
     Text,
 )
-
-_Share = Annotated[float, Meta(ge=-1e3, le=1e3, description="part of an energy; 1 is all of it")]
 
 
 class AlternativeData(Struct):
@@ -35,7 +34,7 @@ class FoundData(Struct):
     effect: Name
     joint: JointNumber | None
     other_joint: JointNumber | None = None
-    share: _Share | None = None
+    share: Share | None = None
     alternatives: list[AlternativeData] = []
     parameters: dict[str, Any] = {}
     form: Text | UnsetType = UNSET
@@ -59,10 +58,10 @@ class JointShareData(Struct):
     """Parts of one joint's torque on data left out."""
 
     joint: JointNumber
-    explained: _Share | None = None
-    predictable_left: _Share | None = None
-    noise: _Share | None = None
-    outside_trained_range: _Share | None = None
+    explained: Share | None = None
+    predictable_left: Share | None = None
+    noise: Share | None = None
+    outside_trained_range: Share | None = None
 
 
 class DiagnosisData(Struct):

@@ -24,6 +24,7 @@ from armloop.schemas.types import (
     Pose,
     Positive,
     Seconds,
+    Share,
     Step,
     Text,
     Vector3,
@@ -38,7 +39,7 @@ _Joints = Meta(min_length=1, max_length=MOST_JOINTS)
 _Terms = Meta(max_length=MOST_TERMS)
 
 
-class JointData(Struct):
+class JointData(Struct, forbid_unknown_fields=True):
     """A moving joint; a limit that is not there is none."""
 
     name: Name
@@ -84,8 +85,8 @@ class EnergyTermData(Struct):
     term: Name
     coefficient: _SUM
     degrees: Annotated[list[Annotated[int, Meta(ge=-9, le=9)]], Meta(max_length=MOST_JOINTS)]
-    sine: Annotated[list[bool], Meta(max_length=MOST_JOINTS)] | bool
-    speeds: Annotated[list[Annotated[int, Meta(ge=0, le=MOST_JOINTS)]], Meta(max_length=4)]
+    sine: bool
+    speeds: Annotated[list[Annotated[int, Meta(ge=0, le=MOST_JOINTS)]], Meta(min_length=2, max_length=2)]
 
 
 class LagrangianData(Struct, tag_field="kind", tag="lagrangian"):
@@ -107,7 +108,9 @@ class EstimateData(Struct):
     """A physical parameter; vectors are lists; a standard error that nobody knows is null."""
 
     value: Finite | Annotated[list[Finite], Meta(min_length=1, max_length=100_000)]
-    std_error: NotNegative | Annotated[list[NotNegative | None], Meta(max_length=100_000)] | None
+    std_error: (
+        NotNegative | Annotated[list[NotNegative | None], Meta(min_length=1, max_length=100_000)] | None
+    )
     unit: Name
 
 
@@ -139,16 +142,29 @@ class RecordedData(Struct):
     drive_gains: Annotated[list[Positive], _Joints] | None
 
 
-class BaselineData(Struct):
-    """What the model leaves on left-out data of its own training runs, per joint."""
+class EnergyPartsData(Struct, forbid_unknown_fields=True):
+    """Parts of one joint's torque energy on left-out data; null where there are too few."""
 
-    rmse: PerJointOrNull | None = None
-    rms: PerJointOrNull | None = None
-    nrmse: PerJointOrNull | None = None
-    worst: PerJointOrNull | None = None
-    reversals: PerJointOrNull | None = None
-    creeping: PerJointOrNull | None = None
-    samples: Count | None = None
+    joint: JointNumber
+    explained: Share | None = None
+    predictable_left: Share | None = None
+    noise: Share | None = None
+    std_error: NotNegative | None = None
+    correlation_time: NotNegative | None = None
+    separated: bool = True
+
+
+class BaselineData(Struct):
+    """What the model leaves on left-out data of its own training runs, per joint; a field that is not known is left away."""
+
+    rmse: PerJointOrNull | UnsetType = UNSET
+    rms: PerJointOrNull | UnsetType = UNSET
+    nrmse: PerJointOrNull | UnsetType = UNSET
+    worst: PerJointOrNull | UnsetType = UNSET
+    reversals: PerJointOrNull | UnsetType = UNSET
+    creeping: PerJointOrNull | UnsetType = UNSET
+    samples: Count | UnsetType = UNSET
+    joints: Annotated[list[EnergyPartsData], _Joints] | UnsetType = UNSET
 
 
 class LogZerosData(Struct):
@@ -175,10 +191,12 @@ class HistoryData(Struct):
     library: Name | None = None
     logs: Annotated[list[Text], Meta(max_length=100_000)] = []
     notes: Annotated[list[Text], Meta(max_length=10_000)] = []
-    range: Annotated[list[Annotated[list[Finite], _Joints]], Meta(min_length=4, max_length=4)] | None = None
-    slowest: Annotated[list[NotNegative], _Joints] | None = None
-    inertial: Annotated[list[_SUM], Meta(max_length=10 * MOST_JOINTS)] | None = None
-    encoder_zeros: EncoderZerosData | None = None
+    range: Annotated[list[Annotated[list[Finite], _Joints]], Meta(min_length=4, max_length=4)] | UnsetType = (
+        UNSET
+    )
+    slowest: Annotated[list[NotNegative], _Joints] | UnsetType = UNSET
+    inertial: Annotated[list[_SUM], Meta(max_length=10 * MOST_JOINTS)] | UnsetType = UNSET
+    encoder_zeros: EncoderZerosData | UnsetType = UNSET
 
 
 class ErrorData(Struct):
@@ -276,27 +294,30 @@ def model_data(data: Any) -> dict[str, Any]:
 def _agree(model: ModelData) -> None:
     """Raise ``ModelError`` where lengths do not go with the number of joints."""
     arm, n = model.arm, len(model.arm.joints)
-    kept = model.history.encoder_zeros
+    history, zeros = model.history, model.history.encoder_zeros
+    ranges = [] if history.range is UNSET else history.range
     lengths: list[tuple[str, Any]] = [
         *((f"arm.{key}", getattr(arm, key)) for key in ("X_PF", "axis", "mass", "com", "inertia")),
         ("friction", model.friction),
         ("recorded.drive_gains", model.recorded.drive_gains),
         *(
             (f"baseline.{key}", getattr(model.baseline, key))
-            for key in ("rmse", "rms", "nrmse", "worst", "reversals", "creeping")
+            for key in ("rmse", "rms", "nrmse", "worst", "reversals", "creeping", "joints")
         ),
-        *((f"history.range[{k + 1}]", row) for k, row in enumerate(model.history.range or [])),
-        ("history.slowest", model.history.slowest),
-        ("history.encoder_zeros.spread", kept and kept.spread),
+        *((f"history.range[{k + 1}]", row) for k, row in enumerate(ranges)),
+        ("history.slowest", history.slowest),
+        ("history.encoder_zeros.spread", UNSET if zeros is UNSET else zeros.spread),
         *(
             (f"uncertainty.{key}", getattr(model.uncertainty, key) or None)
-            for key in ("joints", "friction", "stribeck")
+            for key in ("joints", "friction", "stribeck", "between_logs")
         ),
     ]
     for part in model.components:
         if isinstance(part, TermsData):
             lengths.append((f"terms of step {part.step}", part.joints))
-        elif isinstance(part, RigidBodyData):
+        elif isinstance(part, LagrangianData):
+            lengths += [(f"lagrangian: degrees of {term.term!r:.60}", term.degrees) for term in part.terms]
+        else:
             if len(part.parameters) not in (10 * n, 11 * n):
                 raise ModelError(
                     f"rigid_body: {len(part.parameters)} parameters, {n} links need {10 * n} or {11 * n}"
@@ -307,13 +328,12 @@ def _agree(model: ModelData) -> None:
                         f"rigid_body: the mass of link {k + 1} is {mass:g} kg; no link has more than {HEAVIEST:g}"
                     )
     for place, values in lengths:
-        if values is not None and len(values) != n:
+        if values is not None and values is not UNSET and len(values) != n:
             raise ModelError(f"{place}: {len(values)} joints, the arm has {n}")
-    if any(x < 0 for row in (model.history.range or [])[:3] for x in row):
+    if any(x < 0 for row in ranges[:3] for x in row):
         raise ModelError("history.range: half ranges, velocities and accelerations must not be negative")
-    inertial = model.history.inertial
-    if inertial is not None and len(inertial) != 10 * n:
-        raise ModelError(f"history.inertial: {len(inertial)} parameters, {n} links have {10 * n}")
+    if history.inertial is not UNSET and len(history.inertial) != 10 * n:
+        raise ModelError(f"history.inertial: {len(history.inertial)} parameters, {n} links have {10 * n}")
     _check_arm(arm)
     _check_sums(model)
     for kept_errors in model.uncertainty.torque:
