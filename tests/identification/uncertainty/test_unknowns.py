@@ -32,6 +32,7 @@ from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, probl
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel, load_model
 from armloop.model.components import RigidBody
+from armloop.model.model import model_of as model_of_data
 from armloop.robot.kinematics import nominal_parameters
 from armloop.util.errors import ModelError
 
@@ -306,6 +307,27 @@ def test_the_directions_kept_have_the_torques_errors(kind: str, tmp_path: Path) 
     (tmp_path / "broken.json").write_text(json.dumps(data_of), encoding="utf-8")
     with pytest.raises(ModelError, match=r"uncertainty\.torque: directions must be one row for each"):
         load_model(tmp_path / "broken.json")
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_terms_in_another_order_keep_the_torques_errors(kind: str) -> None:
+    model, data, other = MODELS[kind], samples(MODELS[kind], 2000, 0.05), samples(MODELS[kind], 300, seed=1)
+    every = [Fitted((1, 2, 3), np.ones(data.tau.shape, dtype=bool))]
+    found = replace(model, uncertainty=standard_errors(model, data, every)).to_dict()
+    shuffled = json.loads(json.dumps(found))
+    for part in shuffled["components"]:
+        if part["kind"] == "terms":
+            part["joints"] = [dict(reversed(joint.items())) for joint in part["joints"]]
+        elif part["kind"] == "rigid_body":
+            part["base_parameters"] = dict(reversed(part["base_parameters"].items()))
+        else:
+            part["terms"].reverse()
+    shuffled["friction"] = [law[::-1] for law in shuffled["friction"]]
+    errors = [
+        (torque_errors(model_of_data(each, "it"), other) ** 2).sum(axis=2) for each in (found, shuffled)
+    ]
+    np.testing.assert_allclose(errors[1], errors[0], rtol=1e-6)
+    assert (errors[0].max(axis=0) > 0).all()
 
 
 def test_a_regression_that_is_met_exactly_leaves_the_directions_of_the_others_as_they_are() -> None:

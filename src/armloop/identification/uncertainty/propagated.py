@@ -62,18 +62,20 @@ def torque_errors(model: ReconstructedModel, samples: Samples) -> Array:
     None (r = 0) of a model that keeps no directions of its unknowns, such as one made by hand.
     """
     kept: Sequence[dict[str, Any]] = model.uncertainty.get("torque", [])
-    known = {tuple(one["unknowns"]): _directions(one["directions"]) for one in kept}
+    # by their names: a file gives a joint's terms back in another order than they were found in
+    known = {tuple(sorted(one["unknowns"])): one for one in kept}
     parts = []
     for problem in problems(model) if known else []:
         # files from before a fall's velocity was an unknown tell those of the coefficients
         every = [[True] * len(problem.unknowns), [unknown.linear for unknown in problem.unknowns]]
         names = np.array([unknown.name for unknown in problem.unknowns])
-        told = next((which for which in every if tuple(names[which]) in known), None)
+        told = next((which for which in every if tuple(sorted(names[which])) in known), None)
         if told is None:
             continue
-        found = known[tuple(names[told])]
+        one = known[tuple(sorted(names[told]))]
+        found = _directions(one["directions"])[np.argsort(one["unknowns"], kind="stable")]
         directions = np.zeros((len(names), found.shape[1]))
-        directions[told] = found
+        directions[np.flatnonzero(told)[np.argsort(names[told], kind="stable")]] = found
         torque = np.zeros((*samples.motion.q.shape, directions.shape[1]))
         for design in problem.designs(samples):
             torque[:, design.joint] += design.X @ directions[design.where]

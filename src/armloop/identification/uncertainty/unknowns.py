@@ -108,7 +108,9 @@ def _sparse(model: ReconstructedModel, joint: int) -> Problem:
 def _shared(model: ReconstructedModel, body: RigidBody | Lagrangian) -> Problem:
     if isinstance(body, RigidBody):
         base = BaseParameters.of_arm(model.arm, rotors=len(body.parameters) == 11 * model.arm.n)
-        names, values = list(body.names), body.values
+        # in the order of their columns: a file may list them in another
+        names, known = base.names, dict(zip(body.names, body.values.tolist(), strict=True))
+        values = np.array([known.get(name, 0.0) for name in names])
     else:
         base, names, values = None, body.energy.names, body.coefficients
     unknowns = [Unknown("shared", None, name, float(c), 1) for name, c in zip(names, values, strict=True)]
