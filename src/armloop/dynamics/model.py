@@ -68,7 +68,7 @@ class ModelEquations:
         self.functions = functions
         # A fault of a sensor is none of the arm, an event of one run none of the next.
         kept = [a for a in model.effects if step >= 3 and not a.effect.sensor and not a.effect.event]
-        inertial = model.inertial_parameters() if any(a.effect.needs_inertial for a in kept) else None
+        inertial = model.carried_parameters() if any(a.effect.needs_inertial for a in kept) else None
         laws = []
         for a in kept:
             name, joint, other = a.effect.place

@@ -165,7 +165,7 @@ class ReconstructedModel:
         return tau, load
 
     def _bare_context(self, motion: Motion, effects: Sequence[Effect]) -> Context:
-        inertial = self.inertial_parameters() if any(e.needs_inertial for e in effects) else None
+        inertial = self.carried_parameters() if any(e.needs_inertial for e in effects) else None
         return Context(self.arm, motion, inertial, motion.period)
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
@@ -187,6 +187,18 @@ class ReconstructedModel:
         where the torques do not reveal a parameter, the arm's nominal value stands.
         """
         return self._rigid[0].copy()
+
+    def carried_parameters(self) -> Array:
+        """(10 n,) link parameters of all that the arm carries: :meth:`inertial_parameters` and added bodies, a payload's.
+
+        A base that leans turns the weight of them all.
+        """
+        links = self.inertial_parameters()
+        for added in self._supplied:
+            body = None if added.effect.needs_inertial else added.effect.body(self.arm, added.values, None)
+            if body is not None and body.gravity is None:
+                links += body.parameters
+        return links
 
     def rotor_inertias(self) -> Array:
         """(n,) inertias of motors behind gears that reproduce them beside the links, kg·m² (kg)."""
@@ -247,7 +259,7 @@ class ReconstructedModel:
     def _parts(self, step: int) -> Parts:
         """What acts at one sample: added effects that are friction of one joint stand with its friction."""
         added = self._supplied if step >= 3 else []
-        inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
+        inertial = self.carried_parameters() if any(a.effect.needs_inertial for a in added) else None
         friction = [[t.acting for t in joint if t.step <= step] for joint in self.friction.terms]
         effects = []
         for a in added:

@@ -163,7 +163,7 @@ class AdaptiveFeedforward(LeafSystem):
         """The effects' laws for one sample; made once."""
         if id(effects) not in self._laws:
             needed = any(added.effect.needs_inertial for added in effects)
-            inertial = self._model.inertial_parameters() if needed else None
+            inertial = self._model.with_effects(effects).carried_parameters() if needed else None
             laws = [added.pointwise(self._model.arm, inertial) for added in effects]
             self._laws[id(effects)] = effects, laws
         return self._laws[id(effects)][1]

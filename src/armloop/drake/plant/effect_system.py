@@ -60,7 +60,7 @@ def EffectTorque_(T: type) -> Any:
             smoothing: float = 0.01,
         ) -> None:
             """arm : of n joints; name, joint, other_joint (from 1), parameters : as in `diagnosis.json`, SI units;
-            inertial : (10 n,) link parameters of the known model, for `gravity_tilt` (`model.inertial_parameters()`).
+            inertial : (10 n,) link parameters of the known model, for `gravity_tilt` (`model.carried_parameters()`).
 
             Raises `ModelError` for an effect without such a law, a joint that the arm does not have, wrong parameters.
             """
