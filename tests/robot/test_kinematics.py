@@ -73,9 +73,9 @@ def test_chosen_links_are_columns_of_the_whole(odd_arm):
 
 
 def test_samples_are_carried_along_the_chain_each_by_itself():
-    """A run is longer than what is carried together; the recursion of single samples knows nothing of that."""
+    """A run is longer than what is carried together, by the columns and by the recursion, which take different numbers."""
     arm = load_arm("scara")
-    q, v, vdot = np.random.default_rng(4).normal(size=(3, 2100, arm.n))
+    q, v, vdot = np.random.default_rng(4).normal(size=(3, 5000, arm.n))
     tau = regressor(arm, q, v, vdot) @ nominal_parameters(arm)
     np.testing.assert_allclose(
         tau, joint_torques(arm, nominal_parameters(arm), q, v, vdot), atol=1e-12 * np.abs(tau).max()

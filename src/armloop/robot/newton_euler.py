@@ -16,6 +16,9 @@ from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.functions import MATH, NUMPY, Functions
 
+#: Samples that are computed at a time: it takes many arrays of them, which are to stay in the cache.
+_ROWS = 4096
+
 Vector = tuple[Any, Any, Any]
 Matrix = tuple[Vector, Vector, Vector]
 MassMatrix = Callable[[Sequence[Any] | Array], list[list[Any]]]
@@ -80,13 +83,17 @@ def inverse_dynamics(
     return torques
 
 
-def joint_torques(arm: Arm, parameters: Array, q: Array, v: Array, vdot: Array) -> Array:
+def joint_torques(
+    arm: Arm, parameters: Array, q: Array, v: Array, vdot: Array, gravity: Array | None = None
+) -> Array:
     """(N, n) joint torques of links with these parameters (10 n,) on samples q, v, vdot, (N, n) each."""
-    law = inverse_dynamics(arm, parameters, functions=NUMPY)
+    law = inverse_dynamics(arm, parameters, gravity, NUMPY)
     tau = np.empty_like(q)
-    # A torque that no sample changes comes as a plain number.
-    for j, column in enumerate(law(*([x[:, j] for j in range(arm.n)] for x in (q, v, vdot)))):
-        tau[:, j] = column
+    for first in range(0, len(q), _ROWS):
+        some = slice(first, first + _ROWS)
+        # A torque that no sample changes comes as a plain number.
+        for j, column in enumerate(law(*([x[some, j] for j in range(arm.n)] for x in (q, v, vdot)))):
+            tau[some, j] = column
     return tau
 
 

@@ -1,5 +1,6 @@
 """The effects of rigid bodies, a payload and a tilt, against potential energies and power balance."""
 
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -85,6 +86,20 @@ def test_a_payload_is_found_from_its_columns(context):
     start = fitted(Payload(), context, tau, 0.0)
     again = Payload().torque(context, {k: e.value for k, e in start.items()})
     assert np.abs(again - tau).max() < 0.2 * np.abs(tau).max()
+
+
+@pytest.mark.parametrize("name", ["payload", "gravity_tilt"])
+def test_the_torque_of_a_long_log_takes_little_more_memory_than_the_log(name: str) -> None:
+    arm, rng = an_arm(), np.random.default_rng(0)
+    motion = Motion(np.arange(100_000) * 0.01, *rng.uniform(-1, 1, (3, 100_000, arm.n)), np.array([0]))
+    context = Context(arm, motion, rng.uniform(0, 1, 10 * arm.n))
+    tracemalloc.start()
+    try:
+        effect(name, None).torque(context, PAYLOAD if name == "payload" else TILT)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 5 * motion.q.nbytes
 
 
 def com_in_link() -> np.ndarray:

@@ -20,6 +20,7 @@ from armloop.laws.effects.base import (
 )
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import LINK_PARAMETERS, regressor
+from armloop.robot.newton_euler import joint_torques
 from armloop.util.errors import ModelError
 
 #: An axis turned by less than this from the vertical, rad, is upright.
@@ -133,7 +134,7 @@ class GravityTilt(Effect):
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         q, still = context.motion.q, np.zeros_like(context.motion.q)
         links, gravity, _ = self.body(context.arm, parameters, context.inertial)
-        return np.asarray(regressor(context.arm, q, still, still, gravity) @ links)
+        return joint_torques(context.arm, links, q, still, still, gravity)
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         return all(abs(number(parameters[key].value)) < 0.6 for key in ("roll", "pitch"))

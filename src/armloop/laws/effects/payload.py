@@ -20,8 +20,7 @@ from armloop.laws.effects.base import (
 )
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import regressor
-from armloop.robot.newton_euler import inverse_dynamics
-from armloop.util.functions import NUMPY
+from armloop.robot.newton_euler import joint_torques
 
 _FOUR = np.eye(4)
 #: A centre farther out than a load can be, by no more than so many standard errors, is one that the motion hides.
@@ -94,9 +93,9 @@ class Payload(Effect):
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         arm, motion = context.arm, context.motion
-        alone = inverse_dynamics(arm, self.body(arm, parameters, None).parameters, functions=NUMPY)
-        tau = alone(list(motion.q.T), list(motion.v.T), list(motion.vdot.T))
-        return np.stack([np.broadcast_to(x, motion.samples) for x in tau], axis=1)
+        return joint_torques(
+            arm, self.body(arm, parameters, None).parameters, motion.q, motion.v, motion.vdot
+        )
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         mass, sign = self._mass(x)
