@@ -151,6 +151,15 @@ def test_what_cannot_be_said_is_listed_and_the_nearest_friction_is_written(tmp_p
     assert "Stribeck" not in "\n".join(plain.missing)
 
 
+def test_of_added_friction_that_grows_with_the_load_the_drake_program_says_which_load_it_takes(tmp_path):
+    by_load = ("load_dependent_friction", 2, {"coefficient": 0.3})
+    found = export(
+        model_of(ARMS["three_axis"], friction=PLAIN, effects=(by_load,)), "drake", tmp_path / "arm"
+    )
+    assert found.unsaid[1] > 1e-3 * found.rms[1]
+    assert found.missing == ["friction that grows with the load takes the load without acceleration"]
+
+
 def test_of_friction_that_fades_the_drake_program_has_a_clock(tmp_path):
     """What it leaves of the whole model, which is a warm joint's, is said where it is, and only there."""
     drift = ("friction_drift", 2, {"level": 0.4, "time_constant": 30.0})

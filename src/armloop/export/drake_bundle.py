@@ -80,10 +80,13 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
     whole = whole_torque(model, motion)
     expected = _smoothed(model, what, motion, smoothing)
     missing = [line for line in what.missing if line.startswith(("terms that", "no bodies"))]
-    kinds = {t.kind for joint in model.friction.terms for t in joint}
-    if "load_hysteresis" in kinds:
+    acting = [t.acting for joint in model.friction.terms for t in joint]
+    laws = [a.placed() for a in model.effects]
+    acting += [t for law in laws if law is not None for t in law.terms]
+    by_load = [t.element for t in acting if t.element.by_load]
+    if any(element.way == "memory" for element in by_load):
         missing.append("memory of friction that grows with the load: as if fully slid")
-    if any(kind.startswith("load") for kind in kinds):
+    if by_load:
         missing.append("friction that grows with the load takes the load without acceleration")
     if any(a.effect.name == "transmission_coupling" for a in model.effects):
         missing.append("the inertia of a motor that two joints share")
