@@ -4,7 +4,9 @@ import json
 import re
 import subprocess
 import sys
+import warnings
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -302,6 +304,28 @@ def test_a_continuous_joint_without_limits_stays_without(tmp_path):
     arm = replace(arm, joints=(free, *arm.joints[1:]))
     export(model_of(arm, disguised(arm, False), friction=PLAIN), "urdf", tmp_path / "arm.urdf")
     assert load_arm(tmp_path / "arm.urdf").joints == arm.joints
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(0.3, np.inf), (-np.inf, -0.3), (-np.inf, np.inf)])
+def test_a_joint_with_one_limit_keeps_it_in_every_description(tmp_path, lower, upper):
+    """A format that takes both ends or none must not take 0, or nothing, for the other."""
+    arm = ARMS["scara"]
+    arm = replace(arm, joints=tuple(replace(joint, lower=lower, upper=upper) for joint in arm.joints))
+    for target in ("urdf", "mjcf"):
+        export(model_of(arm, friction=PLAIN), target, tmp_path / f"arm.{target}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that a limit so far away is none
+        assert load_arm(tmp_path / "arm.urdf").joints == arm.joints
+    ends = [lower if np.isfinite(lower) else -1e7, upper if np.isfinite(upper) else 1e7]
+    limited, kinds = ends != [-1e7, 1e7], [joint.kind for joint in arm.joints]
+    for joint, kind in zip(
+        ElementTree.parse(tmp_path / "arm.urdf").findall("joint")[1:], kinds, strict=False
+    ):
+        assert joint.get("type") == (kind if limited or kind == "prismatic" else "continuous")
+        told = [joint.find("limit").get(key) for key in ("lower", "upper")]
+        assert told == ([*map(str, ends)] if limited or kind == "prismatic" else [None, None])
+    for joint in ElementTree.parse(tmp_path / "arm.mjcf").iter("joint"):
+        assert joint.get("range") == (f"{ends[0]} {ends[1]}" if limited else None)
 
 
 def test_the_command_prints_and_answers(tmp_path, capsys):

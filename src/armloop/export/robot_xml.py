@@ -15,6 +15,8 @@ from armloop.export.expressible import Said, body_of
 from armloop.robot.arm import Joint
 from armloop.util.arrays import Array
 
+#: Stands for no limit, rad (m), where a format takes both or none; beyond what is read as a limit.
+_FAR = 1e7
 URDF_FEATURES = frozenset({"damping"})
 SDF_FEATURES = frozenset({"damping", "spring"})
 
@@ -67,10 +69,11 @@ _FILTERS: dict[str, Callable[[Any], object]] = {
     "quaternion": lambda X: _numbers(Rotation.from_matrix(X[:3, :3]).as_quat(scalar_first=True)),
     "reach": lambda X: float(np.linalg.norm(X[:3, 3])),
     "ends": _ends,
+    "end": lambda limit: float(np.clip(limit, -_FAR, _FAR)),
 }
 _TESTS: dict[str, Callable[[Any], object]] = {
     "finite": np.isfinite,
-    "bounded": lambda joint: np.isfinite([joint.lower, joint.upper]).all(),
+    "limited": lambda joint: np.isfinite([joint.lower, joint.upper]).any(),
 }
 _TEMPLATES = Environment(
     loader=PackageLoader("armloop.export"),

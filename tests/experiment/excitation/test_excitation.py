@@ -1,5 +1,7 @@
 """Poses, segments and trajectories keep within their ranges and are what they say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -131,6 +133,15 @@ def test_ranges_of_an_arm_without_stated_ones():
     )
     assert_allclose(ranges.velocity, [1.25, 1.25, 0.25, 1.25])
     assert_allclose(speeds(arm, 2.0, 0.5), [2.0, 2.0, 0.5, 2.0])
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(2.0, np.inf), (-np.inf, -2.0)])
+def test_a_joint_with_one_limit_moves_on_its_free_side(lower, upper):
+    arm = load_arm("scara")
+    arm = replace(arm, joints=tuple(replace(joint, lower=lower, upper=upper) for joint in arm.joints))
+    ranges = ranges_with(arm, None)
+    assert (lower < ranges.lower).all() and (ranges.upper < upper).all()
+    assert_allclose(ranges.upper - ranges.lower, 0.9 * np.where(arm.revolute, 2 * np.pi, 0.2))
 
 
 @pytest.mark.parametrize("bad", [{"lower": np.array([2.0, 0, 0])}, {"velocity": np.array([0.0, 1, 1])}])

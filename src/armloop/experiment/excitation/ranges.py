@@ -52,17 +52,17 @@ class MotionRanges:
     def of(arm: Arm) -> MotionRanges:
         """Return ranges for an arm without stated ones: nine tenths of its travel, half its speed.
 
-        Joints without a limit get +-pi rad (+-0.1 m) and 1 rad/s (0.1 m/s); acceleration is twice the
-        velocity.
+        Joints without a limit get +-pi rad (+-0.1 m) and 1 rad/s (0.1 m/s), those with one as much travel on its free
+        side; acceleration is twice the velocity.
         """
         turns = arm.revolute
         lower, upper, velocity = (
             np.array([getattr(joint, key) for joint in arm.joints], dtype=float)
             for key in ("lower", "upper", "velocity")
         )
-        free = ~(np.isfinite(lower) & np.isfinite(upper))
-        lower = np.where(free, np.where(turns, -np.pi, -0.1), lower)
-        upper = np.where(free, np.where(turns, np.pi, 0.1), upper)
+        travel = np.where(turns, 2 * np.pi, 0.2)
+        lower = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper - travel, -travel / 2))
+        upper = np.where(np.isfinite(upper), upper, lower + travel)
         half = 0.45 * (upper - lower)
         centre = 0.5 * (upper + lower)
         limited = np.isfinite(velocity)
