@@ -203,5 +203,7 @@ def test_a_torque_that_nothing_explains_is_said() -> None:
     assert not replace(noise, explained=None).little_is_explained
     # what is predictable is a law that is missing, and said as such
     assert not replace(noise, predictable_left=0.5).little_is_explained
-    said = Reconstruction.warnings.fget(SimpleNamespace(parts=[noise, replace(noise, explained=0.9)]))  # type: ignore[attr-defined]
+    held_out = SimpleNamespace(moving={"nrmse": [0.1, 0.9, None]})
+    made = SimpleNamespace(parts=[noise, replace(noise, explained=0.9)], held_out=held_out)
+    said = Reconstruction.warnings.fget(made)  # type: ignore[attr-defined]
     assert said == [noise.little()]

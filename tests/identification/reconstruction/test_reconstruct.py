@@ -55,6 +55,17 @@ def test_regressed_together_the_model_still_predicts_a_run_it_never_saw(together
     assert max(together.held_out.moving["nrmse"]) < 0.05
 
 
+def test_a_joint_whose_torque_the_model_does_not_predict_is_said_to_have_a_model_of_no_use() -> None:
+    log = a_run(1, 20.0)
+    tau = log.tau.copy()
+    tau[:, 1] = np.random.default_rng(0).normal(size=len(tau))
+    options = Options(parts=False, standard_errors=False)
+    made = reconstruct([replace(log, tau=tau)], three_axis(), library="rigid-body", options=options)
+    assert made.held_out.moving["nrmse"][1] > 1
+    (said,) = made.warnings
+    assert said.startswith("joint 2: its model is of no use: on held-out data it errs by 2")
+
+
 def test_the_held_out_score_is_the_baseline_of_the_model(together: Reconstruction):
     held = together.held_out.moving
     logs, how, options = [a_run(1), a_run(2)], together.model.conditioning, Options()

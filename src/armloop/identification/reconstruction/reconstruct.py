@@ -48,6 +48,8 @@ from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Workers, one_thread
 
+#: nRMSE on held-out data from which a model is of no use: a torque of zero has 1.
+_NO_USE = 0.95
 #: Samples as recorded in which ripples are looked for, where the logs are not kept in memory.
 _RIPPLE = 300_000
 #: Of streamed logs, so many chunks stand for all where the torque is parted.
@@ -76,8 +78,9 @@ class Reconstruction:
 
     @property
     def warnings(self) -> list[str]:
-        """What must be said before anything else: joints of which the model leaves much, or nearly all."""
-        much = [one.sentence() for one in self.parts if one.much_is_left]
+        """What must be said before anything else: joints of which the model leaves all, much, or nearly all."""
+        much = of_no_use(self.held_out)
+        much += [one.sentence() for one in self.parts if one.much_is_left]
         return much + [one.little() for one in self.parts if one.little_is_explained]
 
     def to_dict(self) -> dict[str, Any]:
@@ -92,6 +95,16 @@ class Reconstruction:
             "warnings": self.warnings,
             "notes": self.notes,
         }
+
+
+def of_no_use(held_out: Score) -> list[str]:
+    """A warning of each joint that the model predicts about as badly as a torque of zero would, or worse."""
+    return [
+        f"joint {j}: its model is of no use: on held-out data it errs by {x:.0%} of the torque (nRMSE), a torque of zero by "
+        "100%; neither control nor a diagnosis can rely on it there"
+        for j, x in enumerate(held_out.moving["nrmse"], 1)
+        if x is not None and x >= _NO_USE
+    ]
 
 
 def default_library(arm: Arm) -> str:
