@@ -44,6 +44,20 @@ def test_files_left_out_are_predicted(logs: list[MotionLog]):
     assert check_mass_matrix([model], q).least > 0
 
 
+def test_logs_of_one_name_keep_their_notes_apart(
+    logs: list[MotionLog], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    paths = [tmp_path / folder / "run.csv" for folder in "abc"]
+    for path, log in zip(paths, logs, strict=True):
+        path.parent.mkdir()
+        write_log(path, log)
+    call = ["crossvalidate", *map(str, paths), "--arm", "three_axis", "--library", "rigid-body", "--json"]
+    assert main(call) == 0
+    answer = json.loads(capsys.readouterr().out)
+    names = ["run", "run (2)", "run (3)"]
+    assert list(answer["notes"]) == names and [one["file"] for one in answer["files"]] == names
+
+
 def test_the_command_answers_for_blocks(
     logs: list[MotionLog], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):

@@ -6,7 +6,7 @@ from synthetic import fourier_motion, friction, measured
 
 from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning, preprocess
-from armloop.identification.validation.splits import by_blocks, by_file, judging_rows
+from armloop.identification.validation.splits import by_blocks, by_file, judging_rows, told_apart
 from armloop.util.errors import InputError
 
 
@@ -22,6 +22,11 @@ def test_each_file_is_left_out_once():
     assert [[log.name for log in split.training] for split in splits] == [["b", "c"], ["a", "c"], ["a", "b"]]
     with pytest.raises(InputError, match="a single log cannot be left out"):
         by_file(logs[:1])
+
+
+def test_a_name_that_stands_twice_gets_a_number_that_no_other_log_has():
+    logs = [a_run(name, 1.0) for name in ("a", "a", "b", "a (2)")]
+    assert [log.name for log in told_apart(logs)] == ["a", "a (3)", "b", "a (2)"]
 
 
 def test_alternating_blocks_share_every_sample_out():

@@ -13,7 +13,7 @@ from armloop.data.repeats import require_different
 from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.identification.scoring import Score, residual, score_errors
-from armloop.identification.validation.splits import Split, by_blocks, by_file, judging_rows
+from armloop.identification.validation.splits import Split, by_blocks, by_file, judging_rows, told_apart
 from armloop.model import ReconstructedModel, model_of
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Mask
@@ -116,6 +116,7 @@ def crossvalidate(
     if leave_out not in LEAVE_OUT:
         raise InputError(f"unknown --leave-out {leave_out!r}; there are: {', '.join(LEAVE_OUT)}")
     require_different(logs)
+    logs = told_apart(logs)
     splits = by_file(logs) if leave_out == "file" else by_blocks(logs, block_seconds)
     options = replace(options or Options(), standard_errors=False, parts=False)
     errors: list[list[_Judged]] = [[] for _ in logs]

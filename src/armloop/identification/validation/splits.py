@@ -10,7 +10,8 @@ would be to a controller; its torque is not.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 
@@ -38,6 +39,19 @@ class Split:
     name: str
     training: list[MotionLog]
     left_out: dict[int, Array]
+
+
+def told_apart(logs: Sequence[MotionLog]) -> list[MotionLog]:
+    """The logs, those of a name that an earlier one has with a number behind it: files of two folders may share theirs."""
+    names = {log.name for log in logs}
+    found: list[MotionLog] = []
+    for log in logs:
+        if any(log.name == other.name for other in found):
+            name = next(one for k in count(2) if (one := f"{log.name} ({k})") not in names)
+            names.add(name)
+            log = replace(log, name=name)
+        found.append(log)
+    return found
 
 
 def by_file(logs: Sequence[MotionLog]) -> list[Split]:
