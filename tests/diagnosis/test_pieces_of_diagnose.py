@@ -83,6 +83,7 @@ class Answers:
             "drowned": lambda *_: False,
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
             "strongest_first": lambda evidence, outcome: self.note("ordered", evidence.name, outcome),
+            "without_law": lambda evidence, law: evidence,
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
         for name, part in parts.items():

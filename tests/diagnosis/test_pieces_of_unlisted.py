@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from synthetic import three_axis
 
-from armloop.data.motion import Motion
+from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import unlisted
 from armloop.diagnosis.evidence import Stacked
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead_of
@@ -42,6 +42,7 @@ class TestLawThatIsNotListed:
             unlisted, "_law", lambda evidence, fit, joint: law if fit is with_effects.after else instead
         )
         monkeypatch.setattr(unlisted, "_is_likelier", lambda evidence, law, named, there, j: False)
+        monkeypatch.setattr(unlisted, "_with_listed", lambda evidence, outcome, bare, law, j: (law, []))
         evidence: Any = SimpleNamespace(scale=np.array([1.0, 2.0]))
         found, kept = unlisted.find_law(evidence, with_effects, lambda text: None)
         assert found is not None and found.joint == 2 and found.baseline == 2.0
@@ -181,7 +182,7 @@ class TestLawThatIsNotListed:
         arm = SimpleNamespace(revolute=np.array([True, True]))
         evidence = SimpleNamespace(
             rows=rows,
-            samples=SimpleNamespace(motion=given),
+            samples=Samples(given, np.zeros((N, 2)), rows, 1.0),
             model=SimpleNamespace(arm=arm),
             scale=np.full(2, 0.25),
         )

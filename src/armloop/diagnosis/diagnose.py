@@ -26,13 +26,14 @@ from armloop.diagnosis.search import (
     Outcome,
     Strength,
     outweighed,
+    refitted,
     strengths,
     strongest_first,
     useful,
     without_effect,
 )
 from armloop.diagnosis.trials import Hypotheses
-from armloop.diagnosis.unlisted import Unlisted
+from armloop.diagnosis.unlisted import Unlisted, without_law
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.diagnosis.zeros import sentences, settled
 from armloop.identification.validation.misrecorded import misrecorded
@@ -306,23 +307,34 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     turned = judge_reversals(evidence, outcome, kept, progress)
     if turned is not None:
         outcome, evidence = turned.outcome, turned.evidence
-    outcome = strongest_first(evidence, useful(evidence, outcome))
+    bare = without_law(evidence, unlisted)
+    if bare is evidence:
+        outcome = useful(evidence, outcome)
+    else:
+        outcome = refitted(evidence, useful(bare, refitted(bare, outcome)))
+    outcome = strongest_first(evidence, outcome)
     progress("how far the run can be judged")
     known = [] if unlisted is None else [unlisted.joint]
     doubted: list[str] = []
     while True:
-        augmented = model.with_effects([*outcome.added(), *(contact.added for contact in contacts)])
+        fitted = beside = outcome
+        if (
+            bare is not evidence
+        ):  # parameters are those beside the law; what the effects leave without it is left
+            beside = refitted(bare, outcome)
+            fitted = replace(outcome, after=replace(beside.after, outside=outcome.after.outside))
+        augmented = model.with_effects([*fitted.added(), *(contact.added for contact in contacts)])
         named = bool(outcome.found or contacts)
         found = Diagnosis(
             "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect",
-            outcome,
+            fitted,
             augmented,
             unlisted,
             evidence,
             contacts,
             sliding,
             turned,
-            strengths=strengths(evidence, outcome),
+            strengths=strengths(bare, beside),
         )
         # a law accounts for what it removes, adopted or not
         left = replace(found, adopted=True).errors()["after"]

@@ -7,7 +7,7 @@ gains nothing; before the run every hypothesis is as likely as any other, and th
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -245,6 +245,21 @@ def _others(found: Sequence[Found], k: int) -> list[Found]:
 def _with_only(evidence: Evidence, outcome: Outcome, found: list[Found]) -> Outcome:
     """The outcome with these of its effects, fitted again."""
     return Outcome(found, outcome.before, _known(evidence, found).fit)
+
+
+def refitted(evidence: Evidence, outcome: Outcome) -> Outcome:
+    """The outcome with its effects fitted to this evidence."""
+    return _with_only(evidence, outcome, outcome.found)
+
+
+def with_effects(evidence: Evidence, outcome: Outcome, more: Sequence[Found]) -> Outcome:
+    """The outcome with further effects, and the share that each of these removes beside all others."""
+    found = [*outcome.found, *more]
+    after, whole = _known(evidence, found).fit, max(float(outcome.before.score.excess.sum()), 1e-9)
+    for k in range(len(outcome.found), len(found)):
+        gained = gain(_known(evidence, _others(found, k)).fit.score, after.score)
+        found[k] = replace(found[k], share=min(gained / whole, 1.0))
+    return Outcome(found, outcome.before, after)
 
 
 def strengths(evidence: Evidence, outcome: Outcome) -> list[Strength]:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
 from typing import Any
 
 import numpy as np
 
 from armloop.data.blocks import block_sums
+from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, covariance
 from armloop.diagnosis.judgement import (
@@ -24,25 +25,29 @@ from armloop.diagnosis.judgement import (
     enough,
     gain,
     lead,
+    much_is_left,
 )
 from armloop.diagnosis.lasting import FEWEST, lasting
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import (
     MOST_EFFECTS,
+    Found,
     Outcome,
     log_prior,
     pruned,
     told,
+    with_effects,
     without_effects_at,
 )
 from armloop.diagnosis.trials import Known
 from armloop.features.angle_sums import AngleSums
-from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law
+from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law, hypotheses
 from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
 from armloop.util.arrays import Array, Index
+from armloop.util.functions import NUMPY
 from armloop.util.progress import Progress
 
 #: A residual is real if a law found on one half of the run explains as much of the other as a listed effect must, or if
@@ -111,7 +116,8 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
 
     Effects that were only the nearest names for a law that is not listed are struck off: those that leave most of
     what they were to explain, and those for which a law of no more parameters explains far more: the latter even if what
-    they leave is no more than the baseline at its worst, for several effects of one joint bend to much.
+    they leave is no more than the baseline at its worst, for several effects of one joint bend to much. Effects stay that
+    with a law beside them, fitted together, are no more parameters than one law in place of both.
 
     Args:
         outcome: what the search found.
@@ -124,9 +130,13 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
         return _one_instead(evidence, outcome, progress)
     progress(f"joint {j + 1}: a residual that no listed effect explains is left; searching its law")
     bare = without_effects_at(evidence, outcome, j)
-    law = _law(evidence, outcome.after, j)
+    law, simpler = _law(evidence, outcome.after, j), _law(evidence, bare.after, j)
+    split, listed = _with_listed(evidence, outcome, bare, simpler, j)
+    if listed:
+        kept = pruned(evidence, bare)
+        stated = _stated(evidence, kept, split, j)
+        return stated, with_effects(without_law(evidence, stated), kept, listed)
     if len(bare.found) < len(outcome.found):
-        simpler = _law(evidence, bare.after, j)
         if _is_simpler(evidence, simpler, outcome, bare, j):
             law, outcome = simpler, bare
         elif outcome.after.score.energy[j] > FORCED * bare.after.score.energy[j]:
@@ -171,13 +181,57 @@ def _is_simpler(evidence: Evidence, law: _Law, outcome: Outcome, bare: Outcome, 
     parameters = sum(effect.complexity for effect in there)
     if law.is_listed(j) or not 0 < len(law.terms) <= parameters:
         return False
-    named = outcome.after.score.of_joint(j)
-    # what the model leaves on its baseline is left by either
-    own = float(named.rows.sum())
-    far_less = gain(named, law.score) >= max(MOSTLY * (named.error - own), own)
-    if far_less and lead(named, law.score) > SIGNIFICANCE:
+    if _leaves_far_less(law.score, outcome.after.score.of_joint(j)):
         return True
     return len(law.terms) < parameters and _is_likelier(evidence, law, outcome.after.score, there, j)
+
+
+def _leaves_far_less(law: Score, other: Score) -> bool:
+    """Whether a law leaves less than half of what the other leaves above the baseline, and surely."""
+    own = float(other.rows.sum())  # is left by either
+    return gain(other, law) >= max(MOSTLY * (other.error - own), own) and lead(other, law) > SIGNIFICANCE
+
+
+def _with_listed(
+    evidence: Evidence, outcome: Outcome, bare: Outcome, law: _Law, j: int
+) -> tuple[_Law, list[Found]]:
+    """Forward selection of listed effects that are fitted with a law: of no more parameters together, and as good.
+
+    Args:
+        law: what would be there without any.
+
+    Returns:
+        The law beside them, and the effects; none where a law by itself does better.
+    """
+    known = Known.of(evidence, bare.after.effects, bare.after.shapes)
+    mine, before = bare.after.stacked.joint == j, known.fit.stacked.X.shape[1]
+    own = [f.effect for f in outcome.found if f not in bare.found]
+    others = [e for e in hypotheses(evidence.model.arm) if e.indices == (j,) and e not in own]
+    asked = [(e, trial) for e in (*own, *others) if (trial := known.trial(e)) is not None]
+    columns = {e: trial.stacked.X[mine, before:] for e, trial in asked}
+    found: list[Found] = []
+    parameters: float = len(law.terms) or np.inf
+    while True:
+        best: tuple[float, _Law, Found] | None = None
+        for effect, trial in asked:
+            beside = [f.effect for f in found]
+            made = _law(evidence, bare.after, j, [columns[e] for e in (*beside, effect)])
+            count = sum(e.complexity for e in (*beside, effect)) + len(made.terms)
+            if effect in beside or not made.terms or count > parameters:
+                continue
+            if law.terms and lead(made.score, law.score) > CHANCE:
+                continue
+            likely = told(made.score) + log_prior(evidence, [effect])
+            if best is None or likely > best[0]:
+                best = likely, made, Found(effect, trial.shapes[-1], 0.0)
+        if best is None:
+            break
+        _, law, more = best
+        found.append(more)
+        parameters = sum(f.effect.complexity for f in found) + len(law.terms)
+    if much_is_left(law.score).any():
+        return law, []
+    return law, found if law.terms and _leaves_far_less(law.score, outcome.after.score.of_joint(j)) else []
 
 
 def _is_likelier(evidence: Evidence, law: _Law, named: Score, there: Sequence[Effect], j: int) -> bool:
@@ -201,6 +255,16 @@ def _parameters(evidence: Evidence, law: _Law, j: int) -> dict[str, Estimate]:
     terms = {name: (scale * b, scale * error) for (b, name), error in zip(law.terms, law.errors, strict=True)}
     low, high = ((end(motion.q[rows], axis=0), end(motion.v[rows], axis=0)) for end in (np.min, np.max))
     return found_law(evidence.model.arm, j + 1, terms, low, high)
+
+
+def without_law(evidence: Evidence, law: Unlisted | None) -> Evidence:
+    """The run without the torque of a law, in which the effects beside it are judged."""
+    if law is None or not law.parameters:
+        return evidence
+    samples = evidence.samples
+    context = evidence.model.context(samples.motion)
+    torque = np.sum([added.torque(context) for added in law.added()], axis=0)
+    return replace(evidence, samples=replace(samples, tau=samples.tau - smooth(samples, torque)))
 
 
 def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
@@ -277,7 +341,21 @@ def _names(library: AngleSums, j: int) -> list[str]:
     return [*library.names, *signed, f"{own}^3"]
 
 
-def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
+def _filtered(evidence: Evidence, j: int, names: Sequence[str]) -> Array:
+    """(rows of a joint, p) functions of a law by their names, through the run's filter."""
+    samples, law = evidence.samples, FoundLaw(j + 1)
+    q, v = list(samples.motion.q.T), list(samples.motion.v.T)
+    columns = [np.broadcast_to(law.of_state({name: 1.0})(NUMPY, q, v)[j], len(q[0])) for name in names]
+    return smooth(samples, np.stack(columns, axis=1))[evidence.rows[:, j]]
+
+
+def _law(evidence: Evidence, after: Fit, j: int, beside: Sequence[Array] = ()) -> _Law:
+    """The law of what a fit leaves of a joint (0-based).
+
+    Args:
+        beside: columns (rows of the joint, c), weighted, of each effect that it is fitted with; without all of them there
+            is no law.
+    """
     mine = after.stacked.joint == j
     y, block, fold = after.held_out[mine], after.stacked.block[mine], after.stacked.fold[mine]
     rows = np.flatnonzero(evidence.rows[:, j])
@@ -285,23 +363,33 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     library = _library(tuple(bool(r) for r in evidence.model.arm.revolute))
     X, own = library.columns(moving), moving.v[:, [j]]
     X = np.hstack([X, X[:, library.order() <= 1] * np.sign(own), own**3])
-    names = _names(library, j)
+    names, given = _names(library, j), sum(columns.shape[1] for columns in beside)
+    X = np.hstack([*beside, X])
     parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
-    whole, none = total(parts), np.zeros(0, dtype=np.intp)
-    sparse = Sparse(max_terms=MOST_EFFECTS, correlation=20.0)
-    supports = [sparse.support(whole - part, none) for part in parts]
-    error = np.array(y)
+    whole, forced = total(parts), np.arange(given)
+    sparse = Sparse(max_terms=MOST_EFFECTS + given, correlation=20.0)
+    supports = [sparse.support(whole - part, forced) for part in parts]
+    used = np.unique(np.concatenate(supports))
+    if len(used) == given:
+        return _Law([], y, block)
+    # coefficients are those of functions that have passed the torque's filter: a direction that changes is a step
+    names = [names[t - given] for t in used[given:]]
+    X = np.hstack([*beside, _filtered(evidence, j, names)])
+    supports = [np.searchsorted(used, support) for support in supports]
+    parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
+    whole, error = total(parts), np.array(y)
     for k, (part, support) in enumerate(zip(parts, supports, strict=True)):
         error[fold == k] -= X[np.ix_(fold == k, support)] @ (whole - part).solve(support)
-    stable = np.array(
-        sorted(set.intersection(*(set(support.tolist()) for support in supports))), dtype=np.intp
-    )
-    if not len(stable) or (error**2).sum() > (1 - MOSTLY) * (y**2).sum():
+    stable = reduce(np.intersect1d, supports)
+    if len(stable) == given or (error**2).sum() > (1 - MOSTLY) * (y**2).sum():
         return _Law([], y, block)
     beta = whole.solve(stable)
     spread = covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.only(mine))
     errors = np.sqrt(np.diag(spread))
-    if (np.abs(beta) < SIGNIFICANCE * errors).all():
-        return _Law([], y, block)  # as an effect of which no coefficient is clear
-    terms = [(float(b), names[t]) for b, t in zip(beta, stable, strict=True)]
-    return _Law(terms, error, block, errors)
+    clear = np.abs(beta) >= SIGNIFICANCE * errors
+    ends = np.cumsum([columns.shape[1] for columns in beside], dtype=np.intp)
+    # as an effect of which no coefficient is clear
+    if not all(own.any() for own in np.split(clear, ends)):
+        return _Law([], y, block)
+    terms = [(float(b), names[t - given]) for b, t in zip(beta[given:], stable[given:], strict=True)]
+    return _Law(terms, error, block, errors[given:])

@@ -1,0 +1,73 @@
+"""A listed effect and an unlisted law of one joint are two things, each with its own parameters."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rubbing_arm import model_with_baseline, run
+
+from armloop.diagnosis import Diagnosis, diagnose
+from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
+
+Law = Callable[[Array, Array], Array]
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    return model_with_baseline()
+
+
+def told(
+    model: ReconstructedModel, seed: int, *laws: Law, part: float = 0.08
+) -> tuple[Diagnosis, list[float]]:
+    """The diagnosis of a run with laws at joint 2, each of so much of its torque; and their coefficients."""
+    log = run(seed, 40.0)
+    shapes = [law(log.q, log.v) for law in laws]
+    size = np.sqrt(np.mean(log.tau[:, 1] ** 2))
+    coefficients = [float(part * size / np.sqrt(np.mean(x**2))) for x in shapes]
+    tau = log.tau.copy()
+    tau[:, 1] += np.sum([c * x for c, x in zip(coefficients, shapes, strict=True)], axis=0)
+    return diagnose(model, [replace(log, tau=tau)]), coefficients
+
+
+@pytest.mark.parametrize(
+    ("seed", "effect", "listed", "key"),
+    [
+        (1, "viscous_friction", lambda q, v: v[:, 1], "coefficient"),
+        (2, "torque_offset", lambda q, v: np.ones(len(v)), "offset"),
+    ],
+)
+def test_a_listed_effect_beside_a_law_is_named_as_what_it_is(
+    model: ReconstructedModel, seed: int, effect: str, listed: Law, key: str
+) -> None:
+    found, truth = told(model, seed, listed, lambda q, v: np.cos(2 * q[:, 0]) * v[:, 1])
+    named = [(f.effect.name, f.effect.joint) for f in found.outcome.found]
+    assert (found.verdict, named) == ("effects_found", [(effect, 2)])
+    own = found.outcome.added()[0].parameters[key]
+    assert float(own.value) == pytest.approx(truth[0], rel=0.02)
+    law = found.unlisted
+    assert law is not None and set(law.parameters) - {"q_low", "q_high", "v_low", "v_high"} == {
+        "cos(2*q1)*v2"
+    }
+    assert float(law.parameters["cos(2*q1)*v2"].value) == pytest.approx(truth[1], rel=0.02)
+    # the law is what is left where it is not adopted, and both are the whole where it is
+    alone, adopted = (each.errors()["after"][1] for each in (found, found.adopt()))
+    assert adopted < 1.5 * found.evidence.scale[1] < alone
+    strength = found.strengths[0]
+    assert strength.times > 3 and found.outcome.found[0].share > 0.2
+
+
+def test_no_listed_effect_stands_in_for_a_part_of_a_law_that_is_not_met(model: ReconstructedModel) -> None:
+    """A wave that the library lacks: terms that come near it leave several times the baseline."""
+    found, _ = told(model, 1, lambda q, v: np.sin(3 * q[:, 0] - q[:, 1]))
+    assert (found.verdict, found.outcome.found) == ("unlisted_effect", [])
+
+
+def test_a_law_alone_has_no_listed_effect_beside_it(model: ReconstructedModel) -> None:
+    found, truth = told(model, 2, lambda q, v: np.sin(2 * q[:, 0]) * v[:, 1] ** 2)
+    assert (found.verdict, found.outcome.found) == ("unlisted_effect", [])
+    law = found.unlisted
+    assert law is not None
+    assert float(law.parameters["sin(2*q1)*v2^2"].value) == pytest.approx(truth[0], rel=0.02)
