@@ -184,6 +184,28 @@ class TestSearch:
                 unclear.update(gone)
                 assert self.found(search) == named
 
+    def test_what_was_not_worth_it_beside_another_is_asked_again_without_that(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """An inertia that a memory hides, which is not clear itself: without the memory the inertia is worth it."""
+
+        def clear(evidence: Any, outcome: Any) -> Any:
+            return replace(outcome, found=[f for f in outcome.found if f.effect != "memory3"])
+
+        def pruned(evidence: Any, outcome: Any) -> Any:
+            names = [f.effect for f in outcome.found]
+            return replace(
+                outcome, found=[f for f in outcome.found if f.effect != "inertia1" or len(names) == 1]
+            )
+
+        for inertia, named in ((500.0, ["inertia1"]), (800.0, [])):  # the latter is no likelier than nothing
+            left = {"": 1000.0, "inertia1": inertia, "memory3": 300.0, "inertia1 memory3": 50.0}
+            search = self.search(monkeypatch, left)
+            assert self.found(search) == ["memory3", "inertia1"]
+            monkeypatch.setattr(searching, "clear", clear)
+            monkeypatch.setattr(searching, "pruned", pruned)
+            assert self.found(search) == named
+
 
 class TestOutcomes:
     """Effects by name, fitted again without one of them."""

@@ -149,16 +149,29 @@ class _Search:
                 break
             found, value = others, best
             self.progress(f"likeliest: {', '.join(f.effect.label() for f in found) or 'nothing'}")
-        after = self._known(found).fit
-        found = [self._stated(found, k, after.score) for k in range(len(found))]
-        outcome = clear(self.evidence, pruned(self.evidence, Outcome(found, self.nothing.fit, after)))
-        unclear = [f.effect for f in found if f not in outcome.found]
+        outcome = self._settled(found)
+        stays = [f.effect for f in outcome.found]
+        unclear = [f.effect for f in found if f.effect not in stays]
         if not unclear:
             return outcome
         # What is not clear may have stood in the way of a simpler law that is: columns nearly alike share one torque.
         self.progress(f"not sure: {', '.join(e.label() for e in unclear)}; searching without")
-        self.barred = [*self.barred, *(effect.place for effect in unclear)]
-        return self.outcome()
+        barred, self.barred = self.barred, [*self.barred, *(effect.place for effect in unclear)]
+        outcome = self.outcome()
+        # What was barred beside others may be worth it, and clear, beside what is there now.
+        self.barred = barred
+        value = log_posterior(self.evidence, outcome.after.score, [f.effect for f in outcome.found])
+        steps = [step for step in self._additions(outcome.found) if step[1][-1].effect in unclear]
+        for likely, more in sorted(steps, key=lambda step: -step[0]):
+            if likely > value + _LEAST and len((again := self._settled(more)).found) == len(more):
+                return again
+        return outcome
+
+    def _settled(self, found: list[Found]) -> Outcome:
+        """A set of effects without what is not worth it or not clear of its error."""
+        after = self._known(found).fit
+        found = [self._stated(found, k, after.score) for k in range(len(found))]
+        return clear(self.evidence, pruned(self.evidence, Outcome(found, self.nothing.fit, after)))
 
     def _steps(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """Sets with one effect more, one less, or another in the place of one."""
