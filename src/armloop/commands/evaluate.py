@@ -23,6 +23,7 @@ def run(options: Evaluate) -> None:
     from armloop.reports.tables import score_table
     from armloop.robot.plausibility import say_beyond_limits
     from armloop.util.doubts import warn
+    from armloop.util.errors import InputError
 
     model, logs = model_and_logs(options)
     # here, for it needs what takes longer to import than a fault of the input to be told
@@ -31,6 +32,10 @@ def run(options: Evaluate) -> None:
     require_different(logs)
     say_beyond_limits(model.arm, logs)
     samples = preprocess(logs, model.conditioning)
+    if not samples.tau.any():
+        raise InputError(
+            f"{logs[0].name}: every tau is zero throughout; give a log that holds the joints' torques"
+        )
     if wrong := misrecorded(model, samples):
         warn(f"{', '.join(log.name for log in logs)}: {wrong}")
     result = score(model, samples)

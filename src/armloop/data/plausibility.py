@@ -86,9 +86,10 @@ def doubts(log: Recorded) -> Iterator[Finding]:
 
 def _constant_torques(log: Recorded) -> Iterator[Finding]:
     for j in np.flatnonzero((np.ptp(log.tau, axis=0) == 0) & (np.ptp(log.q, axis=0) > _MOVES)).tolist():
+        value = log.tau[0, j] + 0.0  # no zero is negative
         yield Finding(
             f"column tau{j + 1}",
-            f"is {log.tau[0, j]:g} throughout, though the joint moves; if its torque was not recorded, leave the log out",
+            f"is {value:g} throughout, though the joint moves; if its torque was not recorded, leave the log out",
         )
 
 

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from armloop import __version__
 from armloop.export.expressible import Said, body_of
 from armloop.robot.arm import Joint
+from armloop.robot.urdf import roll_pitch_yaw
 from armloop.util.arrays import Array
 
 #: Stands for no limit, rad (m), where a format takes both or none; beyond what is read as a limit.
@@ -42,14 +43,6 @@ def described(said: Said, template: str) -> str:
     return _TEMPLATES.get_template(template).render(
         said=said, arm=said.arm, bodies=bodies, has_tool=has_tool, version=__version__
     )
-
-
-def roll_pitch_yaw(R: Array) -> Array:
-    """(3,) angles with R = R_z(yaw) R_y(pitch) R_x(roll)."""
-    pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
-    if np.hypot(R[0, 0], R[1, 0]) < 1e-9:  # straight up or down, roll and yaw are one angle
-        return np.array([np.arctan2(-R[1, 2], R[1, 1]), pitch, 0.0])
-    return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
 
 
 def _numbers(values: Array) -> str:

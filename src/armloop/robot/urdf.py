@@ -232,7 +232,10 @@ def _fix(joint: Element, value: float, path: Path) -> None:
         for element in joint.findall(key):
             joint.remove(element)
     joint.set("type", "fixed")
-    place = {"xyz": " ".join(f"{x:.17g}" for x in xyz), "rpy": " ".join(f"{x:.17g}" for x in _angles(R))}
+    place = {
+        "xyz": " ".join(f"{x:.17g}" for x in xyz),
+        "rpy": " ".join(f"{x:.17g}" for x in roll_pitch_yaw(R)),
+    }
     joint.append(ElementTree.Element("origin", place))
 
 
@@ -255,8 +258,8 @@ def cross_matrix(axis: Array) -> Array:
     return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
-def _angles(R: Array) -> Array:
-    """Roll, pitch and yaw of a rotation; at a pitch of 90° the roll is taken to be zero."""
+def roll_pitch_yaw(R: Array) -> Array:
+    """(3,) angles with R = R_z(yaw) R_y(pitch) R_x(roll); at a pitch of 90° the roll is taken to be zero."""
     across = float(np.hypot(R[0, 0], R[1, 0]))
     pitch = np.arctan2(-R[2, 0], across)
     if across > 1e-12:

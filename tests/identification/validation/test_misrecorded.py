@@ -163,4 +163,9 @@ def test_a_diagnosis_refuses_and_an_evaluation_warns(
     write_log(tmp_path / "turned.csv", turned)
     assert main(["evaluate", str(tmp_path / "model.json"), str(tmp_path / "turned.csv")]) == 0
     assert "warning: turned: the sign of all joints' tau is turned" in capsys.readouterr().err
+    # of torques that are all zero there is nothing to evaluate
+    write_log(tmp_path / "zero.csv", replace(turned, tau=-0.0 * turned.tau))
+    assert main(["evaluate", str(tmp_path / "model.json"), str(tmp_path / "zero.csv")]) == 2
+    said = capsys.readouterr().err
+    assert said.endswith("zero: every tau is zero throughout; give a log that holds the joints' torques\n")
     assert model.arm.n == three_axis().n
