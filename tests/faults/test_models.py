@@ -8,8 +8,10 @@ from typing import Any
 
 import pytest
 from faults.conftest import one_line
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.cli import main
+from armloop.identification.reconstruction import Options, reconstruct
 from armloop.model import load_model
 
 
@@ -286,3 +288,13 @@ def test_an_unknown_standard_error_survives(right: Path, tmp_path: Path) -> None
     load_model(tmp_path / "a.json").save(tmp_path / "b.json")
     again = json.loads((tmp_path / "b.json").read_text())
     assert again["effects"][1]["parameters"]["offset"]["std_error"] is None
+
+
+def test_a_model_without_parts_of_its_error_can_be_read_again(tmp_path: Path) -> None:
+    """Without them, ``baseline.joints`` is an empty list."""
+    motion = fourier_motion(20.0, 100.0, 1)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+    options = Options(standard_errors=False, parts=False)
+    made = reconstruct([measured(motion, tau, 1)], three_axis(), library="rigid-body", options=options).model
+    made.save(tmp_path / "model.json")
+    assert made.baseline["joints"] == [] == load_model(tmp_path / "model.json").baseline["joints"]

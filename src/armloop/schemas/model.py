@@ -164,7 +164,7 @@ class BaselineData(Struct):
     reversals: PerJointOrNull | UnsetType = UNSET
     creeping: PerJointOrNull | UnsetType = UNSET
     samples: Count | UnsetType = UNSET
-    joints: Annotated[list[EnergyPartsData], _Joints] | UnsetType = UNSET
+    joints: Annotated[list[EnergyPartsData], Meta(max_length=MOST_JOINTS)] | UnsetType = UNSET
 
 
 class LogZerosData(Struct):
@@ -302,8 +302,9 @@ def _agree(model: ModelData) -> None:
         ("recorded.drive_gains", model.recorded.drive_gains),
         *(
             (f"baseline.{key}", getattr(model.baseline, key))
-            for key in ("rmse", "rms", "nrmse", "worst", "reversals", "creeping", "joints")
+            for key in ("rmse", "rms", "nrmse", "worst", "reversals", "creeping")
         ),
+        ("baseline.joints", model.baseline.joints or UNSET),  # without parts there are none
         *((f"history.range[{k + 1}]", row) for k, row in enumerate(ranges)),
         ("history.slowest", history.slowest),
         ("history.encoder_zeros.spread", UNSET if zeros is UNSET else zeros.spread),
