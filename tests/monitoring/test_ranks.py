@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armloop.monitoring.alarms import LONGEST, Reached, find_alarms
-from armloop.monitoring.ranks import FEWEST, scan, threshold
+from armloop.monitoring.ranks import FEWEST, scan, soonest, threshold
 from armloop.monitoring.units import Stream
 
 
@@ -108,3 +108,20 @@ def test_units_that_come_one_by_one_tell_the_same_as_units_that_come_at_once() -
         done = until
     assert alarms == whole.alarms and reached == whole.reached
     np.testing.assert_array_equal(np.concatenate(parts), whole.evidence)
+
+
+@pytest.mark.parametrize("limit", [6.0, 13.8])
+def test_no_change_raises_an_alarm_sooner(limit: float) -> None:
+    """Whatever the units are, at as many it is possible, and at one less it is not."""
+    fewest = soonest(limit)
+    rng = np.random.default_rng(1)
+    number = np.arange(fewest)[:, None]
+    begins = np.arange(FEWEST, fewest)[None]
+    changed = np.where(number >= begins, 1e3 + number, rng.normal(size=(fewest, 1)))
+    values = np.hstack(
+        [changed, np.sort(rng.normal(size=(fewest, 200)), axis=0), rng.normal(size=(fewest, 200))]
+    )
+    found = scan(values, np.zeros(fewest, dtype=np.intp), np.zeros(values.shape[1])).log_evidence.max(
+        axis=(1, 2)
+    )
+    assert found[-1] > limit >= found[:-1].max()

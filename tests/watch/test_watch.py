@@ -1,6 +1,7 @@
 """A fleet is watched: what changed is found and named, what did not is left alone, what is broken is set aside."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -10,11 +11,13 @@ from answers import answered
 from operation import contents
 
 from armloop.cli import main
+from armloop.commands import watch as watch_command
 from armloop.data.log import read_log, write_log
 from armloop.data.tables import write_columns
 from armloop.reports.watch_report import _cards
 from armloop.util.errors import InputWarning
 from armloop.watch import Options, watch
+from armloop.watch.fleet import model_and_digest
 from armloop.watch.sources import find_logs, recorded_at
 from armloop.watch.store import Store
 from armloop.watch.verdicts import whole_history
@@ -73,6 +76,45 @@ def test_the_page_stands_by_itself(fleet: Path, watched: Path, tmp_path: Path) -
     assert "http://" not in text.replace("http://www.w3.org", "") and "https://" not in text
     for words in ("Trends of", "payload", "loaded", "rubbing", "healthy", "warm up"):
         assert words in text
+
+
+def test_so_few_logs_that_no_alarm_is_possible_are_not_called_unchanged(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor is an arm that the store does not know shown; what comes in batches is counted together."""
+    logs = sorted((fleet / "logs" / "healthy").iterdir())[:5]
+    monkeypatch.setattr(watch_command, "_batches", lambda stream: iter([[str(log)] for log in logs[:3]]))
+    page, store = tmp_path / "watch.html", str(tmp_path / "store")
+    arguments = [
+        "watch",
+        "--models",
+        str(fleet / "models"),
+        "--store",
+        store,
+        "--sums-only",
+        "--report",
+        str(page),
+    ]
+    assert main([*arguments, "--logs", "-", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["logs"]["read"] == 3
+    (arm,) = answer["arms"]
+    (note,) = arm["notes"]
+    assert re.fullmatch(r"an alarm takes \d\d units of operation, there are 3", note)
+    text = page.read_text(encoding="utf-8")
+    assert "Of no arm there is enough operation yet" in text and "has changed" not in text
+    assert main([*arguments, "--logs", *map(str, logs), "--arm", "elbow"]) == 2
+    assert "--arm elbow: there is no such arm in the store; its arms are healthy" in capsys.readouterr().err
+
+
+def test_a_model_that_is_replaced_is_read_anew(fleet: Path, tmp_path: Path) -> None:
+    path, other = tmp_path / "model.json", fleet / "models" / "healthy.json"
+    path.write_bytes(other.read_bytes())
+    first = model_and_digest(path)
+    assert model_and_digest(path)[0] is first[0]
+    path.write_text(json.dumps({**json.loads(other.read_text()), "notes": ["another"]}))
+    again = model_and_digest(path)
+    assert again[1] != first[1] and again[0] is not first[0]
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TextIO
 
 from armloop.commands.arguments import Json, processes
@@ -89,6 +90,7 @@ def run(options: Watch) -> int:
         counts += outcome.counts
     if outcome is None:
         outcome = watch(options.models, [], options.store, how, tell)
+    outcome = replace(outcome, counts=counts)
     if options.report is not None:
         from armloop.reports.watch_report import watch_report
 

@@ -18,6 +18,7 @@ one programme are exchangeable, to within the tolerance.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,6 +153,22 @@ def _earlier_equals(codes: NDArray[np.intp], largest: int) -> NDArray[np.intp]:
     counts = np.empty_like(order)
     np.put_along_axis(counts, order, index - first, axis=1)
     return counts
+
+
+#: An alarm is possible after fewer units of one programme than that, whatever is asked for.
+_ENOUGH = 200
+
+
+@lru_cache(maxsize=16)
+def soonest(limit: float) -> int:
+    """The fewest units of one programme after which a change, however large, can bring the evidence above a limit (log)."""
+    number = np.arange(float(_ENOUGH))[:, None]
+    begins = number.T[:, FEWEST : FEWEST + HORIZON]
+    # beyond all others from some unit on: nothing is stronger evidence
+    values = np.where(number >= begins, _ENOUGH + number, number)
+    found = scan(values, np.zeros(_ENOUGH, dtype=np.intp), np.zeros(values.shape[1]))
+    over = np.flatnonzero(found.log_evidence.max(axis=(1, 2)) > limit)
+    return int(over[0]) + 1 if len(over) else _ENOUGH
 
 
 def threshold(mean_units: float | Array, streams: int) -> Array:

@@ -19,10 +19,11 @@ from armloop.reports.watch_tables import (
     named,
 )
 from armloop.reports.words import effect_name, number, percent, place, unit
+from armloop.util.errors import InputError
 from armloop.watch import Options, Outcome
 from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.store import Store
-from armloop.watch.verdicts import Tested, examine, whole_history
+from armloop.watch.verdicts import Tested, examine, too_few, whole_history
 
 _SHOWN, _STREAMS = 4, 60
 
@@ -108,13 +109,24 @@ def _heat(outcome: Outcome) -> Section:
 
 def _overview(outcome: Outcome) -> Section:
     if not outcome.alarms:
-        return Section("Alarms", ["No arm has changed."])
+        young = [arm["arm"] for arm in outcome.arms if too_few(arm["units"], arm["limit"])]
+        if len(young) == len(outcome.arms):
+            return Section("Alarms", ["Of no arm there is enough operation yet for an alarm."])
+        but = (
+            f", but for {', '.join(young)}, of which there is too little operation yet for an alarm"
+            if young
+            else ""
+        )
+        return Section("Alarms", [f"No arm has changed{but}."])
     return Section("Alarms", [], [], [alarms_table(list(reversed(outcome.alarms)))])
 
 
 def _chosen(outcome: Outcome, arm: str | None) -> dict[str, Any]:
     by_name = {item["arm"]: item for item in outcome.arms}
-    if arm in by_name:
+    if arm is not None:
+        if arm not in by_name:
+            known = ", ".join(sorted(by_name)[:12]) + (", ..." if len(by_name) > 12 else "")
+            raise InputError(f"--arm {arm}: there is no such arm in the store; its arms are {known}")
         return by_name[arm]
     alarms = [alarm for alarm in outcome.alarms if alarm["arm"] in by_name]
     if alarms:

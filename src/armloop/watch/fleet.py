@@ -34,15 +34,20 @@ def model_for(models: dict[str, Path], arm: str) -> Path | None:
     return models.get(arm, models.get(""))
 
 
-@lru_cache(maxsize=4)
 def model_and_digest(path: Path) -> tuple[ReconstructedModel, str]:
-    """A model, and 12 hexadecimal digits of its file and of the columns that are kept for it.
+    """A model, and 12 hexadecimal digits of its file and of the columns that are kept for it; read anew once it is replaced.
 
     Sums against another model, or with other columns, do not add to these.
 
     Raises:
         InputError: the model cannot be read, or predicts currents.
     """
+    state = path.stat() if path.exists() else None
+    return _read(path, state and (state.st_ino, state.st_mtime_ns, state.st_size))
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, state: tuple[int, int, int] | None) -> tuple[ReconstructedModel, str]:
     model = load_model(path)
     model.require_torques(f"{path}:")
     digest = hashlib.sha256(path.read_bytes())

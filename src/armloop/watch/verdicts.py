@@ -18,7 +18,7 @@ from armloop.model import ReconstructedModel
 from armloop.monitoring.alarms import Alarm, Watched, find_alarms
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Named, Normal, later_part, name_change
-from armloop.monitoring.ranks import HORIZON, threshold
+from armloop.monitoring.ranks import HORIZON, soonest, threshold
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
 from armloop.monitoring.warmth import Adjusted, adjust, warms, without_warmth
@@ -147,6 +147,12 @@ def _notes(values: Array) -> tuple[str, ...]:
     )
 
 
+def too_few(units: int, limit: float) -> list[str]:
+    """What to say of so few units that no change could have brought the evidence above a limit (log) yet."""
+    fewest = soonest(limit) if np.isfinite(limit) else units
+    return [f"an alarm takes {fewest} units of operation, there are {units}"] if units < fewest else []
+
+
 def test_arm(task: Task) -> dict[str, Any]:
     """Test an arm's new logs, name what each new alarm is, and keep both; what was tested before is not again."""
     store = Store(task.store)
@@ -182,7 +188,7 @@ def test_arm(task: Task) -> dict[str, Any]:
         "warmth": past.known,
         "evidence": _by_place(listed, past.most),
         "alarms": list(past.alarms),
-        "notes": list(past.notes),
+        "notes": [*past.notes, *too_few(past.count, past.limit)],
     }
     if heads:
         past.save(store, task.arm)
