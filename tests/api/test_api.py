@@ -104,6 +104,11 @@ def test_a_model_scores_plots_and_shows_itself(model, tmp_path):
     assert model.plot(test)._repr_png_().startswith(b"\x89PNG")  # what a notebook asks for
     assert repr(model).startswith("<armloop.Model of") and "\n" not in repr(model)
     assert "tau1 =" in str(model)
+    held_out = [x for x in model.account.held_out.moving["nrmse"] if x is not None]
+    assert f", held-out nRMSE {np.mean(held_out):.3g}>" in repr(model)
+    model.save(tmp_path / "model.json")
+    kept = [x for x in model.baseline["nrmse"] if x is not None]
+    assert f", baseline nRMSE {np.mean(kept):.3g}>" in repr(al.load_model(tmp_path / "model.json"))
     assert "<img" in model._repr_html_() and "<pre" in score._repr_html_()
     assert model.report(tmp_path / "report.html").read_text().startswith("<!")
     model.save(tmp_path / "model.json")

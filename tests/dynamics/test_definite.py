@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from exact_parts import ARMS, energies, model_of
+from synthetic import three_axis
 
 from armloop.dynamics import definite, physics
 from armloop.dynamics.definite import MassTerms, prove_definite
@@ -193,3 +196,12 @@ def test_what_the_budget_does_not_reach_is_only_searched(monkeypatch: pytest.Mon
     checks = check_physics(model_of(arm, energies(arm), effects=drives))
     assert checks.definite and checks.certificate == "" and 0 < checks.proven < 1
     assert checks.to_dict()["mass_matrix"]["certificate"] is None
+
+
+def test_a_joint_with_one_limit_is_tried_as_far_from_that_as_one_with_none() -> None:
+    arm = three_axis()
+    ends = [(0.5, np.inf), (-np.inf, -1.0), (-np.inf, np.inf)]
+    joints = tuple(replace(j, lower=low, upper=up) for j, (low, up) in zip(arm.joints, ends, strict=True))
+    low, high = physics.joint_limits(replace(arm, joints=joints))
+    np.testing.assert_allclose(low, [0.5, -1.0 - 2 * np.pi, -np.pi])
+    np.testing.assert_allclose(high, [0.5 + 2 * np.pi, -1.0, np.pi])

@@ -113,11 +113,17 @@ class Model(ReconstructedModel):
         return ReconstructedModel(**_parts(self))
 
     def __repr__(self) -> str:
-        nrmse = [x for x in self.baseline.get("nrmse", []) if x is not None]
-        held_out = f", held-out nRMSE {np.mean(nrmse):.3g}" if nrmse else ""
+        held_out = self.account is not None
+        errors = (
+            self.account.held_out.moving["nrmse"]
+            if self.account is not None
+            else self.baseline.get("nrmse", [])
+        )
+        known = [x for x in errors if x is not None]
+        error = f", {'held-out' if held_out else 'baseline'} nRMSE {np.mean(known):.3g}" if known else ""
         kinds = ", ".join(dict.fromkeys(component.kind for component in self.components))
         more = f", {len(self.effects)} effects added" if self.effects else ""
-        return f"<armloop.Model of {self.arm.name}, {self.arm.n} joints: {kinds}{more}{held_out}>"
+        return f"<armloop.Model of {self.arm.name}, {self.arm.n} joints: {kinds}{more}{error}>"
 
     def __str__(self) -> str:
         parts = [repr(self).strip("<>")]

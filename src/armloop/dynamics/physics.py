@@ -183,7 +183,8 @@ def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
 def joint_limits(arm: Arm, trained: Any = None) -> tuple[Array, Array]:
     """(n,) lower and upper positions that are tried: the URDF's, of a revolute joint one turn at most.
 
-    A prismatic joint without limits is tried over twice the range trained on (a metre if that is not known).
+    A prismatic joint without limits is tried over twice the range trained on (a metre if that is not known), one with a
+    limit on one side as far from that.
 
     Args:
         trained: half ranges of q first and its centre last, as a model's history keeps them.
@@ -192,7 +193,11 @@ def joint_limits(arm: Arm, trained: Any = None) -> tuple[Array, Array]:
     half = np.full(arm.n, 1.0) if trained is None else 2 * np.array(trained[0], dtype=float)
     centre = np.zeros(arm.n) if trained is None else np.array(trained[-1], dtype=float)
     half, centre = np.where(arm.revolute, np.pi, half), np.where(arm.revolute, 0.0, centre)
-    whole = np.isfinite(lower) & np.isfinite(upper) & ~(arm.revolute & (upper - lower >= 2 * np.pi))
+    has_lower, has_upper = np.isfinite(lower), np.isfinite(upper)
+    whole = has_lower & has_upper & ~(arm.revolute & (upper - lower >= 2 * np.pi))
+    centre = np.where(
+        has_lower & ~has_upper, lower + half, np.where(has_upper & ~has_lower, upper - half, centre)
+    )
     return np.where(whole, lower, centre - half), np.where(whole, upper, centre + half)
 
 
