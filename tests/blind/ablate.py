@@ -134,7 +134,7 @@ RULES = [
         (unlisted, "_one_instead"),
     ),
     _rule("a simpler law takes their place", lambda *_: False, (unlisted, "_is_simpler")),
-    _rule("a law of listed functions is none", lambda self, j: False, (unlisted._Law, "is_listed")),
+    _rule("a law of listed functions is none", lambda self, j: False, (unlisted.Law, "is_listed")),
     _rule("a law that is found is real", lambda *_: False, (unlisted, "_follows_a_law")),
     _rule("only what lasts is a law", lambda *_: 1.0, (unlisted, "lasting")),
     _rule("unlisted laws", lambda *_: None, (unlisted, "_left_over")),

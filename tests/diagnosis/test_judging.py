@@ -203,7 +203,7 @@ def test_a_width_beyond_what_was_tried_is_not_resolved() -> None:
     ("joints", "law"), [(3, "sin(q1+2*q3)*v2^2"), (4, "sin(3*q4)*v4^2"), (6, "sin(3*q5)*v2*v5")]
 )
 def test_a_law_is_sought_among_waves_of_three_times_an_angle_whatever_the_arm(joints: int, law: str) -> None:
-    assert law in unlisted._library((True,) * joints).names
+    assert law in unlisted.library_of((True,) * joints).names
 
 
 def test_a_law_that_explains_an_event_holds_where_the_event_was() -> None:

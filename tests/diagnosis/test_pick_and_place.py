@@ -125,11 +125,11 @@ def test_a_law_leaves_far_less_beyond_the_baseline(
 
     monkeypatch.setattr(unlisted, "lead", lambda worse, better: lead)
     monkeypatch.setattr(unlisted, "log_prior", lambda evidence, effects: -8.0 * len(effects))
-    monkeypatch.setattr(unlisted, "_library", lambda revolute: None)
-    monkeypatch.setattr(unlisted, "_names", lambda library, j: [""] * 100)
+    monkeypatch.setattr(unlisted, "library_of", lambda revolute: None)
+    monkeypatch.setattr(unlisted, "names_of", lambda library, j: [""] * 100)
     arm = SimpleNamespace(revolute=np.array([True]))
     evidence: Any = SimpleNamespace(variation=np.array([1.0]), model=SimpleNamespace(arm=arm))
-    found = unlisted._Law([(1.0, "v1"), (2.0, "q1")], np.full(rows, np.sqrt(law / rows)), block)
+    found = unlisted.Law([(1.0, "v1"), (2.0, "q1")], np.full(rows, np.sqrt(law / rows)), block)
     named, bare = outcome(SimpleNamespace(complexity=parameters)), outcome()
     assert unlisted._is_simpler(evidence, found, named, bare, 0) is simpler
 
@@ -212,7 +212,7 @@ def test_a_law_is_not_stated_where_a_less_simple_effect_does_as_well(
     known = SimpleNamespace(of=lambda *given: SimpleNamespace(trial=lambda effect: fits[effect]))
     monkeypatch.setattr(unlisted, "Known", known)
     nothing: Any = None
-    law = unlisted._Law([(1.0, "sin(3*q2)")], wavy, block[joint == 1])
+    law = unlisted.Law([(1.0, "sin(3*q2)")], wavy, block[joint == 1])
     rivals: Any = [("none", 1.0), ("spring", 0.97)]
     assert unlisted._does_as_well(nothing, bare, rivals, law, 1) is as_well
     assert not unlisted._does_as_well(nothing, bare, rivals[:1], law, 1)

@@ -162,8 +162,8 @@ class TestUnlisted:
     def test_dry_friction_drag_and_an_offset_are_listed(self) -> None:
         names = ["1", "v2", "sign(v2)", "v2^2*sign(v2)"]
 
-        def law(*names: str) -> unlisted._Law:
-            return unlisted._Law([(1.0, name) for name in names], np.zeros(1), np.zeros(1, dtype=np.intp))
+        def law(*names: str) -> unlisted.Law:
+            return unlisted.Law([(1.0, name) for name in names], np.zeros(1), np.zeros(1, dtype=np.intp))
 
         assert law(*names).is_listed(1)
         assert law("v2").is_listed(1)

@@ -10,7 +10,7 @@ import pytest
 from synthetic import three_axis
 
 from armloop.data.motion import Motion, Samples
-from armloop.diagnosis import unlisted
+from armloop.diagnosis import law_selection, unlisted
 from armloop.diagnosis.evidence import Stacked
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead_of
 from armloop.diagnosis.score import Score
@@ -32,14 +32,14 @@ class TestLawThatIsNotListed:
 
         with_effects, without = outcome([1, 2], left), outcome([], bare)
         block = np.array([0, 0, 1, 1])
-        law = unlisted._Law([], np.full(4, np.sqrt(0.9 * left / 4)), block)
-        instead = unlisted._Law([(0.5, "v2^3")] * terms, np.full(4, np.sqrt(simpler / 4)), block)
+        law = unlisted.Law([], np.full(4, np.sqrt(0.9 * left / 4)), block)
+        instead = unlisted.Law([(0.5, "v2^3")] * terms, np.full(4, np.sqrt(simpler / 4)), block)
         monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: 1)
         monkeypatch.setattr(unlisted, "without_effects_at", lambda evidence, outcome, joint: without)
         monkeypatch.setattr(unlisted, "pruned", lambda evidence, outcome: outcome)
         monkeypatch.setattr(unlisted, "_parameters", lambda evidence, law, joint: {"v2": None})
         monkeypatch.setattr(
-            unlisted, "_law", lambda evidence, fit, joint: law if fit is with_effects.after else instead
+            unlisted, "law_left", lambda evidence, fit, joint: law if fit is with_effects.after else instead
         )
         monkeypatch.setattr(unlisted, "_is_likelier", lambda evidence, law, named, there, j: False)
         monkeypatch.setattr(unlisted, "_with_listed", lambda evidence, outcome, bare, law, j: (law, []))
@@ -82,10 +82,10 @@ class TestLawThatIsNotListed:
         monkeypatch.setattr(unlisted, "lead", lambda worse, better: 0.0)
 
         def simpler(energy: float, terms: int, form: str = "v2^3") -> bool:
-            law = unlisted._Law([(1.0, form)] * terms, np.full(rows, np.sqrt(energy / rows)), block)
+            law = unlisted.Law([(1.0, form)] * terms, np.full(rows, np.sqrt(energy / rows)), block)
             return unlisted._is_simpler(evidence, law, with_effects, bare, 1)
 
-        functions = len(unlisted._names(unlisted._library((True, True, True)), 1))
+        functions = len(unlisted.names_of(unlisted.library_of((True, True, True)), 1))
         for terms in (1, 2):
             # against two effects of three parameters, each one of many; ten half blocks tell of a joint
             needed = terms * np.log(functions) - 2 * np.log(len(hypotheses(arm))) - LOG_ODDS
@@ -116,12 +116,12 @@ class TestLawThatIsNotListed:
             def law(evidence: Any, fit: Any, j: int) -> Any:
                 asked.append(j)
                 terms = [(1.0, "sign(v2)"), (2.0, form)]
-                return unlisted._Law(terms, np.full(100, np.sqrt(0.55)), block[joint == 1])
+                return unlisted.Law(terms, np.full(100, np.sqrt(0.55)), block[joint == 1])
 
             monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: None)
             monkeypatch.setattr(unlisted, "pruned", lambda evidence, outcome: outcome)
             monkeypatch.setattr(unlisted, "_parameters", lambda evidence, law, joint: {"v2": None})
-            monkeypatch.setattr(unlisted, "_law", law)
+            monkeypatch.setattr(unlisted, "law_left", law)
             monkeypatch.setattr(
                 unlisted,
                 "without_effects_at",
@@ -145,7 +145,7 @@ class TestLawThatIsNotListed:
         assert verdict(155.0, [*named, arm], [arm]) == "law at joint 2"
 
     def test_every_function_that_is_sought_can_be_stated(self) -> None:
-        names = unlisted._names(unlisted._library((True, True, False)), 1)
+        names = unlisted.names_of(unlisted.library_of((True, True, False)), 1)
         assert len(set(names)) == len(names) and {"sign(v2)", "v2^3", "v2*sign(v2)"} <= set(names)
         ends = np.zeros(3), np.ones(3)
         stated = unlisted.found_law(
@@ -163,7 +163,7 @@ class TestLawThatIsNotListed:
 
     def test_a_richer_library_for_fewer_joints(self) -> None:
         """Waves of so many times an angle in all, of so many joints at most, and products of two speeds."""
-        chosen = [unlisted._library((True,) * n) for n in range(1, 9)]
+        chosen = [unlisted.library_of((True,) * n) for n in range(1, 9)]
         assert [(each.N1, each.together) for each in chosen] == [
             *[(3, None)] * 3,
             (3, 2),
@@ -189,7 +189,7 @@ class TestLawThatIsNotListed:
         joint = np.nonzero(rows)[1]
         sample = np.nonzero(rows)[0]
         block = sample // 30
-        none, fold = np.zeros((len(joint), 0)), block % unlisted.FOLDS
+        none, fold = np.zeros((len(joint), 0)), block % law_selection.FOLDS
         stacked = Stacked(none, np.zeros(len(joint)), block, fold, joint, rows.shape[1], block, none)
         after = SimpleNamespace(stacked=stacked, held_out=np.full(len(joint), 99.0))
         return evidence, after, rng.standard_normal(N // 2)
@@ -200,7 +200,7 @@ class TestLawThatIsNotListed:
         q, v = motion.q[::2].T, motion.v[::2].T
         told = 3.0 * v[1] ** 3 - 2.0 * np.cos(q[0]) * np.sign(v[1])
         after.held_out[mine] = told + 0.1 * noise
-        law = unlisted._law(evidence, after, 1)
+        law = unlisted.law_left(evidence, after, 1)
         found = {name: (b, error) for (b, name), error in zip(law.terms, law.errors, strict=True)}
         assert set(found) == {"v2^3", "cos(q1)*sign(v2)"}
         X = np.stack([v[1] ** 3, np.cos(q[0]) * np.sign(v[1])], axis=1)
@@ -212,11 +212,11 @@ class TestLawThatIsNotListed:
         # what is left is what was not fitted there: more than if it had been, and hardly more
         fitted = float(np.linalg.lstsq(X, after.held_out[mine], rcond=None)[1][0])
         assert fitted < law.score.error < 1.01 * fitted
-        assert unlisted._law(evidence, after, 1).form(0.25).count("*v2^3") == 1
+        assert unlisted.law_left(evidence, after, 1).form(0.25).count("*v2^3") == 1
         # half of the energy must go
         for part, is_law in ((0.9, True), (1.1, False)):
             after.held_out[mine] = told + part * np.sqrt(np.mean(told**2) / np.mean(noise**2)) * noise
-            law = unlisted._law(evidence, after, 1)
+            law = unlisted.law_left(evidence, after, 1)
             assert bool(law.terms) == is_law
         assert law.left.tolist() == after.held_out[mine].tolist() and len(law.errors) == 0
 
@@ -228,13 +228,13 @@ class TestLawThatIsNotListed:
         """
         evidence, after, noise = self.moving(1000)
         motion, mine = evidence.samples.motion, after.stacked.joint == 1
-        p = len(unlisted._names(unlisted._library((True, True)), 1))
+        p = len(unlisted.names_of(unlisted.library_of((True, True)), 1))
         cost = np.log(12.5) + 2 * np.log(p)
         assert 0.28 < np.exp(-cost / 12.5) < 0.36
         told = np.sin(motion.q[::2, 0])
         size = np.sqrt(part / (1 - part) * np.mean(told**2) / np.mean(noise**2))
         after.held_out[mine] = told + size * noise
-        assert bool(unlisted._law(evidence, after, 1).terms) == is_law
+        assert bool(unlisted.law_left(evidence, after, 1).terms) == is_law
 
     @pytest.mark.parametrize(("error", "is_law"), [(0.33, True), (0.34, False)])
     def test_a_coefficient_of_a_law_is_three_of_its_stated_errors_from_zero(
@@ -243,8 +243,8 @@ class TestLawThatIsNotListed:
         evidence, after, noise = self.moving()
         mine = after.stacked.joint == 1
         after.held_out[mine] = evidence.samples.motion.v[::2, 1] + 0.01 * noise
-        monkeypatch.setattr(unlisted, "covariance", lambda X, left, rows: error**2 * np.eye(X.shape[1]))
-        assert bool(unlisted._law(evidence, after, 1).terms) == is_law
+        monkeypatch.setattr(law_selection, "covariance", lambda X, left, rows: error**2 * np.eye(X.shape[1]))
+        assert bool(unlisted.law_left(evidence, after, 1).terms) == is_law
 
     def test_at_most_four_functions_make_a_law(self) -> None:
         evidence, after, noise = self.moving()
@@ -252,7 +252,7 @@ class TestLawThatIsNotListed:
         q, v = motion.q[::2].T, motion.v[::2].T
         five = [4 * v[1], 4 * v[0], 4 * np.sin(q[0]), 4 * np.cos(2 * q[1]), 0.3 * v[0] * v[1]]
         after.held_out[mine] = sum(five) + 0.01 * noise
-        law = unlisted._law(evidence, after, 1)
+        law = unlisted.law_left(evidence, after, 1)
         assert {name for _, name in law.terms} == {"v1", "v2", "sin(q1)", "cos(2*q2)"}
 
     @pytest.mark.parametrize(
@@ -271,8 +271,8 @@ class TestLawThatIsNotListed:
 
         monkeypatch.setattr(unlisted, "lead", led)
         monkeypatch.setattr(unlisted, "enough", lambda evidence, score: np.array([0.0, 10.0]))
-        law = unlisted._Law([], np.full(10, np.sqrt(left)), np.arange(10) // 2)
-        monkeypatch.setattr(unlisted, "_law", lambda evidence, after, j: law)
+        law = unlisted.Law([], np.full(10, np.sqrt(left)), np.arange(10) // 2)
+        monkeypatch.setattr(unlisted, "law_left", lambda evidence, after, j: law)
         held_out = np.repeat([9.0, np.sqrt(before)], 10)
         score = Score.of(0, held_out, np.repeat([0, 1], 10), np.arange(20) // 2, 2)
         after: Any = SimpleNamespace(score=score)
@@ -288,9 +288,9 @@ class TestLawThatIsNotListed:
         bites = np.select([block == 3, block == 9, block == 12], [25.0, 9.0, 6.0], 1.0) * left
         before, law = (Score.of(0, x, np.zeros_like(block), block, 1) for x in (bites, left))
         assert lead_of(before.errors[0], law.errors[0], law.counts[0]) < SIGNIFICANCE
-        found = unlisted._Law([(1.0, "sin(3*q1)*v1^2")], left, block)
+        found = unlisted.Law([(1.0, "sin(3*q1)*v1^2")], left, block)
         monkeypatch.setattr(unlisted, "enough", lambda evidence, score: np.array([100.0]))
-        monkeypatch.setattr(unlisted, "_law", lambda evidence, after, j: found)
+        monkeypatch.setattr(unlisted, "law_left", lambda evidence, after, j: found)
         nothing: Any = None
         after: Any = SimpleNamespace(score=before)
         assert unlisted._follows_a_law(nothing, after, 0)
@@ -310,7 +310,7 @@ class TestLawThatIsNotListed:
             scale=np.array([9.0, 4.0]),
         )
         none = np.zeros(0, dtype=np.intp)
-        mine = unlisted._Law([(0.5, "v2")], np.zeros(0), none, np.array([0.25]))
+        mine = unlisted.Law([(0.5, "v2")], np.zeros(0), none, np.array([0.25]))
         stated = unlisted._parameters(evidence, mine, 1)
         assert (stated["v2"].value, stated["v2"].std_error, stated["v2"].unit) == (2.0, 1.0, "N*m*s/rad")
         wider = unlisted.Unlisted(2, 1.0, 1.0, "", 1.0, law).over(evidence).parameters

@@ -1,22 +1,20 @@
-"""A residual that no listed effect explains: is it real, where is it, and what is its law?
+"""Unmodelled dynamics: a residual that no listed effect explains. Is it real, where is it, and what is its law?
 
-The law is sought with the sparse machinery among waves of the angles and their sums, velocities, their products
-and directions, and the joint's own speed to the third power, and reported only if both halves of the run choose it.
+Listed effects that are part of it are named as what they are; see :mod:`armloop.diagnosis.law_selection` for the rest.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache, reduce
 from typing import Any
 
 import numpy as np
 
 from armloop.data.blocks import block_sums
 from armloop.data.signals import smooth
-from armloop.diagnosis.evidence import FOLDS, Evidence
-from armloop.diagnosis.fit import Fit, covariance
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import Fit
 from armloop.diagnosis.judgement import (
     CHANCE,
     MOSTLY,
@@ -28,9 +26,9 @@ from armloop.diagnosis.judgement import (
     much_is_left,
 )
 from armloop.diagnosis.lasting import FEWEST, lasting
+from armloop.diagnosis.law_selection import Law, LawSelection, law_left, library_of, names_of
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import (
-    MOST_EFFECTS,
     Found,
     Outcome,
     log_prior,
@@ -40,14 +38,10 @@ from armloop.diagnosis.search import (
     without_effects_at,
 )
 from armloop.diagnosis.trials import Known
-from armloop.features.angle_sums import AngleSums
 from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law, hypotheses
 from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
-from armloop.regression.moments import Moments, total
-from armloop.regression.sparse import Sparse
-from armloop.util.arrays import Array, Index
-from armloop.util.functions import NUMPY
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress
 
 #: A residual is real if a law found on one half of the run explains as much of the other as a listed effect must, or if
@@ -60,9 +54,6 @@ REMAINDER = 0.03
 #: Effects that leave more than this part of a joint's energy as a real residual are not what is there; nor are those of
 #: whose remainder, beyond the baseline's, a law of no more parameters in their place removes most.
 FORCED = 0.3
-#: Most candidates of a library, and those that are tried: the order of its waves, and of how many angles one may be.
-_MOST_CANDIDATES = 1500
-_RICHEST_FIRST = ((3, None), (3, 2), (3, 1), (2, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,11 +121,11 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
         return _one_instead(evidence, outcome, progress)
     progress(f"joint {j + 1}: a residual that no listed effect explains is left; searching its law")
     bare = without_effects_at(evidence, outcome, j)
-    law, simpler = _law(evidence, outcome.after, j), _law(evidence, bare.after, j)
+    law, simpler = law_left(evidence, outcome.after, j), law_left(evidence, bare.after, j)
     split, listed = _with_listed(evidence, outcome, bare, simpler, j)
     if listed:
         kept = pruned(evidence, bare)
-        stated = _stated(evidence, kept, split, j)
+        stated = _stated(evidence, with_effects(evidence, kept, listed), split, j)
         return stated, with_effects(without_law(evidence, stated), kept, listed)
     if len(bare.found) < len(outcome.found):
         if _is_simpler(evidence, simpler, outcome, bare, j):
@@ -155,7 +146,7 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
         if outcome.after.score.energy[j] <= rows and len(there) == 1:
             continue  # no more than the baseline's
         progress(f"joint {j + 1}: whether a law that is not listed does better than what was found there")
-        law = _law(evidence, bare.after, j)
+        law = law_left(evidence, bare.after, j)
         if not _is_simpler(evidence, law, outcome, bare, j):
             continue
         if len(there) > 1 or not _does_as_well(evidence, bare, there[0].rivals, law, j):
@@ -164,7 +155,7 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
 
 
 def _does_as_well(
-    evidence: Evidence, bare: Outcome, rivals: Sequence[tuple[Effect, float]], law: _Law, j: int
+    evidence: Evidence, bare: Outcome, rivals: Sequence[tuple[Effect, float]], law: Law, j: int
 ) -> bool:
     """Whether an effect that was taken for as good as the one named, if less simple, leaves no more than a law does."""
     known, mine = Known.of(evidence, bare.after.effects, bare.after.shapes), law.score
@@ -172,7 +163,7 @@ def _does_as_well(
     return any(trial is not None and lead(trial.score.of_joint(j), mine) <= CHANCE for trial in trials)
 
 
-def _is_simpler(evidence: Evidence, law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
+def _is_simpler(evidence: Evidence, law: Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
     """Whether a law has no more parameters than the effects in whose place it is put, and surely leaves far less.
 
     With fewer parameters it need but be likelier. A law of listed effects was the search's to find.
@@ -193,8 +184,8 @@ def _leaves_far_less(law: Score, other: Score) -> bool:
 
 
 def _with_listed(
-    evidence: Evidence, outcome: Outcome, bare: Outcome, law: _Law, j: int
-) -> tuple[_Law, list[Found]]:
+    evidence: Evidence, outcome: Outcome, bare: Outcome, law: Law, j: int
+) -> tuple[Law, list[Found]]:
     """Forward selection of listed effects that are fitted with a law: of no more parameters together, and as good.
 
     Args:
@@ -207,17 +198,20 @@ def _with_listed(
     mine, before = bare.after.stacked.joint == j, known.fit.stacked.X.shape[1]
     own = [f.effect for f in outcome.found if f not in bare.found]
     others = [e for e in hypotheses(evidence.model.arm) if e.indices == (j,) and e not in own]
-    asked = [(e, trial) for e in (*own, *others) if (trial := known.trial(e)) is not None]
+    trials = [(e, trial) for e in (*own, *others) if (trial := known.trial(e)) is not None]
+    # what acts on other joints, too, is not judged by this one
+    asked = [(e, trial) for e, trial in trials if e in own or not trial.stacked.X[~mine, before:].any()]
     columns = {e: trial.stacked.X[mine, before:] for e, trial in asked}
-    found: list[Found] = []
+    laws, found = LawSelection(evidence, bare.after, j), list[Found]()
     parameters: float = len(law.terms) or np.inf
     while True:
-        best: tuple[float, _Law, Found] | None = None
+        best: tuple[float, Law, Found] | None = None
         for effect, trial in asked:
-            beside = [f.effect for f in found]
-            made = _law(evidence, bare.after, j, [columns[e] for e in (*beside, effect)])
-            count = sum(e.complexity for e in (*beside, effect)) + len(made.terms)
-            if effect in beside or not made.terms or count > parameters:
+            effects = [*(f.effect for f in found), effect]
+            if effect in effects[:-1]:
+                continue
+            made = laws.beside([columns[e] for e in effects])
+            if not made.terms or sum(e.complexity for e in effects) + len(made.terms) > parameters:
                 continue
             if law.terms and lead(made.score, law.score) > CHANCE:
                 continue
@@ -234,14 +228,14 @@ def _with_listed(
     return law, found if law.terms and _leaves_far_less(law.score, outcome.after.score.of_joint(j)) else []
 
 
-def _is_likelier(evidence: Evidence, law: _Law, named: Score, there: Sequence[Effect], j: int) -> bool:
+def _is_likelier(evidence: Evidence, law: Law, named: Score, there: Sequence[Effect], j: int) -> bool:
     """Whether a law has the larger posterior: each term is one of many functions, as each effect is one of many."""
-    functions = np.log(len(_names(_library(tuple(evidence.model.arm.revolute.tolist())), j)))
+    functions = np.log(len(names_of(library_of(tuple(evidence.model.arm.revolute.tolist())), j)))
     of_law = told(law.score) - len(law.terms) * functions
     return bool(of_law > told(named.of_joint(j)) + log_prior(evidence, there))
 
 
-def _stated(evidence: Evidence, outcome: Outcome, law: _Law, j: int) -> Unlisted:
+def _stated(evidence: Evidence, outcome: Outcome, law: Law, j: int) -> Unlisted:
     """A joint's residual beside the effects of an outcome, and its law."""
     scale, named = float(evidence.scale[j]), outcome.after.score.of_joint(j)
     rmse, with_form = (float(np.sqrt(s.error / s.rows.sum())) * scale for s in (named, law.score))
@@ -249,7 +243,7 @@ def _stated(evidence: Evidence, outcome: Outcome, law: _Law, j: int) -> Unlisted
     return Unlisted(j + 1, rmse, scale, law.form(scale), with_form, estimates, law.left)
 
 
-def _parameters(evidence: Evidence, law: _Law, j: int) -> dict[str, Estimate]:
+def _parameters(evidence: Evidence, law: Law, j: int) -> dict[str, Estimate]:
     """The law's coefficients, N·m (N) per unit of their functions, and the range of the samples it was found on."""
     motion, rows, scale = evidence.samples.motion, evidence.rows[:, j], float(evidence.scale[j])
     terms = {name: (scale * b, scale * error) for (b, name), error in zip(law.terms, law.errors, strict=True)}
@@ -289,107 +283,5 @@ def _follows_a_law(evidence: Evidence, after: Fit, j: int) -> bool:
     own, least = after.score.of_joint(j), float(enough(evidence, after.score)[j])
     if own.error <= least:
         return False  # even all of it would not be
-    law = _law(evidence, after, j).score
+    law = law_left(evidence, after, j).score
     return gain(own, law) > least and lead(own, law) > SIGNIFICANCE
-
-
-@dataclass(frozen=True, eq=False)
-class _Law:
-    """Terms with coefficients (weighted), none if none is stable, what is left (R,), weighted, and the block of each row.
-
-    Left of each half of the run is what terms and coefficients leave there that were chosen and fitted on the other.
-    Standard errors of the coefficients count blocks as the independent units.
-    """
-
-    terms: list[tuple[float, str]]
-    left: Array
-    block: Index
-    errors: Array = field(default_factory=lambda: np.zeros(0))
-
-    @cached_property
-    def score(self) -> Score:
-        """What judges it."""
-        return Score.of(len(self.terms), self.left, np.zeros_like(self.block), self.block, 1)
-
-    def is_listed(self, j: int) -> bool:
-        """Whether all of it is what listed effects of the joint (0-based) are: an offset, dry friction and drag."""
-        v = f"v{j + 1}"
-        return {name for _, name in self.terms} <= {"1", v, f"sign({v})", f"{v}^2*sign({v})"}
-
-    def form(self, scale: float) -> str:
-        """The law in N·m (N)."""
-        return " ".join(f"{scale * b:+.3g}*{name}" for b, name in self.terms).removeprefix("+")
-
-
-@lru_cache(maxsize=8)
-def _library(revolute: tuple[bool, ...]) -> AngleSums:
-    """The richest library that is not too large: with many joints, waves of fewer of their angles together."""
-    libraries = (AngleSums(revolute, N1, 2, "velocity", few) for N1, few in _RICHEST_FIRST)
-    return next(
-        (each for each in libraries if each.size <= _MOST_CANDIDATES), AngleSums(revolute, 1, 2, "velocity")
-    )
-
-
-def _names(library: AngleSums, j: int) -> list[str]:
-    """Names of the functions of a law of a joint (0-based): the library's, those with its direction, its speed cubed."""
-    own = f"v{j + 1}"
-    signed = [
-        f"{name}*sign({own})".removeprefix("1*")
-        for name, order in zip(library.names, library.order(), strict=True)
-        if order <= 1
-    ]
-    return [*library.names, *signed, f"{own}^3"]
-
-
-def _filtered(evidence: Evidence, j: int, names: Sequence[str]) -> Array:
-    """(rows of a joint, p) functions of a law by their names, through the run's filter."""
-    samples, law = evidence.samples, FoundLaw(j + 1)
-    q, v = list(samples.motion.q.T), list(samples.motion.v.T)
-    columns = [np.broadcast_to(law.of_state({name: 1.0})(NUMPY, q, v)[j], len(q[0])) for name in names]
-    return smooth(samples, np.stack(columns, axis=1))[evidence.rows[:, j]]
-
-
-def _law(evidence: Evidence, after: Fit, j: int, beside: Sequence[Array] = ()) -> _Law:
-    """The law of what a fit leaves of a joint (0-based).
-
-    Args:
-        beside: columns (rows of the joint, c), weighted, of each effect that it is fitted with; without all of them there
-            is no law.
-    """
-    mine = after.stacked.joint == j
-    y, block, fold = after.held_out[mine], after.stacked.block[mine], after.stacked.fold[mine]
-    rows = np.flatnonzero(evidence.rows[:, j])
-    moving = evidence.samples.motion.take(rows)
-    library = _library(tuple(bool(r) for r in evidence.model.arm.revolute))
-    X, own = library.columns(moving), moving.v[:, [j]]
-    X = np.hstack([X, X[:, library.order() <= 1] * np.sign(own), own**3])
-    names, given = _names(library, j), sum(columns.shape[1] for columns in beside)
-    X = np.hstack([*beside, X])
-    parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
-    whole, forced = total(parts), np.arange(given)
-    sparse = Sparse(max_terms=MOST_EFFECTS + given, correlation=20.0)
-    supports = [sparse.support(whole - part, forced) for part in parts]
-    used = np.unique(np.concatenate(supports))
-    if len(used) == given:
-        return _Law([], y, block)
-    # coefficients are those of functions that have passed the torque's filter: a direction that changes is a step
-    names = [names[t - given] for t in used[given:]]
-    X = np.hstack([*beside, _filtered(evidence, j, names)])
-    supports = [np.searchsorted(used, support) for support in supports]
-    parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
-    whole, error = total(parts), np.array(y)
-    for k, (part, support) in enumerate(zip(parts, supports, strict=True)):
-        error[fold == k] -= X[np.ix_(fold == k, support)] @ (whole - part).solve(support)
-    stable = reduce(np.intersect1d, supports)
-    if len(stable) == given or (error**2).sum() > (1 - MOSTLY) * (y**2).sum():
-        return _Law([], y, block)
-    beta = whole.solve(stable)
-    spread = covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.only(mine))
-    errors = np.sqrt(np.diag(spread))
-    clear = np.abs(beta) >= SIGNIFICANCE * errors
-    ends = np.cumsum([columns.shape[1] for columns in beside], dtype=np.intp)
-    # as an effect of which no coefficient is clear
-    if not all(own.any() for own in np.split(clear, ends)):
-        return _Law([], y, block)
-    terms = [(float(b), names[t - given]) for b, t in zip(beta[given:], stable[given:], strict=True)]
-    return _Law(terms, error, block, errors[given:])
