@@ -372,3 +372,35 @@ def test_the_measured_bag_of_a_ur10(measured, tmp_path, capsys):
     assert len(log.runs()) == 1
     np.testing.assert_allclose(log.period, 0.008, rtol=1e-6)
     np.testing.assert_allclose(log.tau[0, 0], 8.3223478)
+
+
+def table(path: Path, log: MotionLog, *below: str, names: list[str] | None = None) -> Path:
+    """A motion log as CSV, with lines below it."""
+    rows = np.column_stack([log.time, log.q, log.v, log.tau])
+    names = names or ["time", *(f"{kind}{j}" for kind in ("q", "v", "tau") for j in (1, 2, 3))]
+    lines = [",".join(names), *(",".join(f"{x:.9g}" for x in row) for row in rows), *below]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    "remark", ["end of recording", "# stopped by hand", "-- end --" + 9 * ",", ",,,stopped"]
+)
+def test_a_remark_is_left_out_and_said(tmp_path, log, remark):
+    found = convert([table(tmp_path / "log.csv", log, remark)])
+    assert_same(found.log, log)
+    assert f"line 602 left out, no row but a remark: {remark.strip(',')!r}" in found.notes
+    path = table(tmp_path / "paused.csv", log)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines[:300], remark, *lines[300:]]))
+    assert_same(convert([path]).log, log)
+
+
+def test_a_header_or_a_row_of_words_is_no_remark(tmp_path, log, capsys):
+    out = ["--out", str(tmp_path / "out.parquet")]
+    other = table(tmp_path / "other.csv", log, "time,q1,v1,tau1", "6,0,0,0", "6.01,0,0,0")
+    assert "line 602 is a header with other columns than line 1" in refused(
+        ["convert", str(other), *out], capsys
+    )
+    words = table(tmp_path / "words.csv", log, "6" + 9 * ",ERR")
+    assert "column q1, row 601 (line 602): not a number" in refused(["convert", str(words), *out], capsys)

@@ -72,19 +72,27 @@ def read_text(path: Path) -> TextTable:
         units = {name: unit for name, unit in zip(names, cells, strict=False) if name and unit}
         lines = [*lines[:below], "", *lines[below + 1 :]]
         notes.append(f"units from line {below + 1}: {', '.join(dict.fromkeys(units.values()))}")
-    heads = [k for k in range(first, len(lines)) if lines[k].strip() and _is_header(lines[k], separator)]
-    repeated = set(heads[1:])
+    heads, remarks = [first], []
     body, numbers = [], []
     for k in range(first + 1, len(lines)):
-        if k in repeated:
-            if _names(lines[k], separator) != names:
+        words = _is_header(lines[k], separator)
+        if words and _names(lines[k], separator) == names:
+            heads.append(k)
+        elif lines[k].lstrip().startswith("#"):
+            remarks.append(k)
+        elif words and not _is_row(lines[k], separator, len(names)):
+            if not _is_remark(lines, k, separator, len(names)):
                 raise LogError(
                     f"{path}: line {k + 1} is a header with other columns than line {first + 1}; split the file there"
                 )
-            continue
-        if lines[k].strip() and not lines[k].lstrip().startswith("#"):
+            remarks.append(k)
+        elif lines[k].strip():
             body.append(lines[k])
             numbers.append(k + 1)
+    if remarks:
+        said = lines[remarks[0]].strip(f" \t{separator}")[:60]
+        more = f" and {len(remarks) - 1} more" if len(remarks) > 1 else ""
+        notes.append(f"line {remarks[0] + 1}{more} left out, no row but a remark: {said!r}")
     if not body:
         raise LogError(f"{path}: there are no rows below the header; a log has one row per sample")
     starts = sorted({int(np.searchsorted(numbers, head + 1)) for head in heads} - {len(body)})
@@ -254,6 +262,19 @@ def _names(line: str, separator: str) -> list[str]:
 def _is_header(line: str, separator: str) -> bool:
     cells = [cell for cell in _cells(line, separator) if cell.strip()]
     return bool(cells) and sum(not _NUMBER.match(cell) for cell in cells) > len(cells) / 2
+
+
+def _is_row(line: str, separator: str, width: int) -> bool:
+    """Whether a line of words has a number among as many cells as a row: words are then what was not measured."""
+    cells = [cell for cell in _cells(line, separator) if cell.strip()]
+    return len(cells) == width and any(_NUMBER.match(cell) for cell in cells)
+
+
+def _is_remark(lines: list[str], k: int, separator: str, width: int) -> bool:
+    """Whether a line of words is no header of other columns: it names too few for the rows below, or none are below it."""
+    below = next((line for line in lines[k + 1 :] if line.strip() and not _is_header(line, separator)), None)
+    named = sum(bool(cell.strip()) for cell in _cells(lines[k], separator))
+    return below is None or (named < width == _width(below, separator))
 
 
 def _number(text: str | None) -> float:
