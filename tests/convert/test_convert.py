@@ -404,3 +404,17 @@ def test_a_header_or_a_row_of_words_is_no_remark(tmp_path, log, capsys):
     )
     words = table(tmp_path / "words.csv", log, "6" + 9 * ",ERR")
     assert "column q1, row 601 (line 602): not a number" in refused(["convert", str(words), *out], capsys)
+
+
+def test_a_log_of_currents_converted_once_more_stays_one(tmp_path, log, capsys):
+    first, again = str(tmp_path / "first.parquet"), str(tmp_path / "again.parquet")
+    assert main(["convert", str(table(tmp_path / "log.csv", log)), "--tau-unit", "A", "--out", first]) == 0
+    assert main(["convert", first, "--out", again]) == 0
+    assert "tau is in A" in capsys.readouterr().out
+    assert convert([again]).log.tau_unit == "A"
+    assert "tau is in A; leave the option out" in refused(
+        ["convert", first, "--tau-unit", "N*m", "--out", str(tmp_path / "no.parquet")], capsys
+    )
+    gained = convert([again], answers=Answers(drive_gains=[2.0, 3.0, 4.0])).log
+    assert gained.tau_unit == "N*m"
+    np.testing.assert_allclose(gained.tau, log.tau * [2, 3, 4], atol=1e-6)

@@ -188,11 +188,11 @@ def _told(tau: QuantityMap) -> set[str]:
 def _require_like(recording: Recording, tau: QuantityMap, unit: str, option: str) -> None:
     """Raise ``LogError`` where an option says currents of what the source says are torques, or the other way round.
 
-    A motion log's torques may be currents: its header says no unit.
+    A motion log's torques may be currents: its header says no unit. A file of currents says so.
     """
     told = _told(tau)
     wrong = {one for one in told if (one in CURRENTS) != (unit in CURRENTS)}
-    if wrong and recording.kind != "motion log":
+    if wrong and (recording.kind != "motion log" or "A" in wrong):
         raise LogError(
             f"{recording.path}: {option}, but the {recording.kind} says itself that tau is in "
             f"{', '.join(sorted(wrong))}; leave the option out, or write the right unit in a --map"

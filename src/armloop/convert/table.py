@@ -9,6 +9,7 @@ from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
 from armloop.convert.text import TextTable, clock_seconds, numbers_of, read_text
 from armloop.data.header import JOINT_COLUMN
+from armloop.data.log import told_unit
 from armloop.data.tables import PARQUET, is_number, kind_of
 from armloop.util.errors import LogError
 
@@ -17,7 +18,7 @@ def read_table(path: Path) -> Recording:
     """Read one table; raises ``LogError`` where it cannot be read."""
     table = _parquet(path) if kind_of(path) == PARQUET else read_text(path)
     columns, units, said = table.columns, table.units, [*table.notes, *table.left_out()]
-    kind, mapping, unsure = "motion log", None if units else _own(columns), {}
+    kind, mapping, unsure = "motion log", None if units else _own(columns, told_unit(path) or "N*m"), {}
     if mapping is None:
         found = suggest(list(columns), units=units)
         kind, mapping, unsure = "table", found.mapping, found.unsure
@@ -39,7 +40,7 @@ def read_table(path: Path) -> Recording:
     )
 
 
-def _own(columns: dict[str, Array]) -> Mapping | None:
+def _own(columns: dict[str, Array], tau_unit: str) -> Mapping | None:
     """The map of a table that is a motion log already: its units are SI by definition, except of tau (A or N·m)."""
     joints = {name for name in columns if JOINT_COLUMN.fullmatch(name)}
     n = sum(name.startswith("q") for name in joints)
@@ -52,7 +53,7 @@ def _own(columns: dict[str, Array]) -> Mapping | None:
     return Mapping(
         TimeMap("time", "s"),
         QuantityMap(names["q"], "rad"),
-        QuantityMap(names["tau"], "N*m"),
+        QuantityMap(names["tau"], tau_unit),
         QuantityMap(names["v"], "rad/s"),
         vdot,
     )

@@ -239,12 +239,7 @@ def read_log(
     path = path_of(path, "the path of a log", LogError)
     _check_unit(tau_unit, path)
     kinds = check_header(path, joints)
-    told = said_of(path, _UNIT)
-    if told not in (None, *TAU_UNITS):
-        raise LogError(
-            f"{path}: says of itself that tau is in {told[:40]!r}; it must be one of {', '.join(TAU_UNITS)}"
-        )
-    if tau_unit != "A" and told == "A":
+    if tau_unit != "A" and told_unit(path) == "A":
         raise LogError(
             f"{path}: tau holds motor currents (A), as the file itself says; give --tau-unit A, and --drive-gains to make "
             "torques of them"
@@ -281,6 +276,16 @@ def write_log(path: str | Path, log: MotionLog) -> None:
     if not isinstance(log, MotionLog):
         raise LogError(f"{where}: what is written must be a MotionLog; this is of type {type(log).__name__}")
     write_columns(where, log.columns(), said_of_log(log))
+
+
+def told_unit(path: Path) -> str | None:
+    """Return what a Parquet file whose header has been read says that its tau is in; None where it does not, as a CSV."""
+    told = said_of(path, _UNIT)
+    if told not in (None, *TAU_UNITS):
+        raise LogError(
+            f"{path}: says of itself that tau is in {told[:40]!r}; it must be one of {', '.join(TAU_UNITS)}"
+        )
+    return told
 
 
 def said_of_log(log: MotionLog) -> dict[str, str]:

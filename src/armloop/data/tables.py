@@ -130,7 +130,7 @@ def write_columns(path: Path, columns: Mapping[str, Array], about: Mapping[str, 
 
 def said_of(path: Path, key: str) -> str | None:
     """Return what a Parquet file whose header has been read says of itself; None where it says nothing, as a CSV does."""
-    if kind_of(path) == CSV:
+    if kind_of(path) != PARQUET:
         return None
     import pyarrow.parquet
 
