@@ -406,6 +406,22 @@ def test_a_header_or_a_row_of_words_is_no_remark(tmp_path, log, capsys):
     assert "column q1, row 601 (line 602): not a number" in refused(["convert", str(words), *out], capsys)
 
 
+def test_gains_are_of_the_arms_joints_and_a_gripper_has_none(tmp_path, log):
+    joints = ["gripper", *NAMES[::-1]]
+    names = ["time", *(f"{joint} {kind}" for kind in ("q", "i") for joint in joints)]
+    cells = np.column_stack([log.time, log.q[:, 0], log.q[:, ::-1], log.q[:, 0], log.tau[:, ::-1]])
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([",".join(names), *(",".join(f"{x:.9g}" for x in row) for row in cells)]))
+    mapping = Mapping(
+        TimeMap("time", "s"), QuantityMap(names[1:5], "rad"), QuantityMap(names[5:], "A"), joints=joints
+    )
+    gains = np.array([2.0, 3.0, 4.0])
+    found = convert([path], arm=three_axis(), mapping=mapping, answers=Answers(drive_gains=gains.tolist()))
+    np.testing.assert_allclose(found.log.tau, log.tau * gains, atol=1e-6)
+    with pytest.raises(InputError, match="4 drive gains for 3 joints"):
+        convert([path], arm=three_axis(), mapping=mapping, answers=Answers(drive_gains=[2.0, 3.0, 4.0, 1.0]))
+
+
 def test_a_log_of_currents_converted_once_more_stays_one(tmp_path, log, capsys):
     first, again = str(tmp_path / "first.parquet"), str(tmp_path / "again.parquet")
     assert main(["convert", str(table(tmp_path / "log.csv", log)), "--tau-unit", "A", "--out", first]) == 0

@@ -132,15 +132,16 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     joints, asked = mapping.n, []
     tau, q, v = mapping.tau, mapping.q, mapping.v
     if answers.drive_gains is not None:
-        if len(answers.drive_gains) != joints:
+        # Gains are given base to tip, as everywhere; the map's lists are in the order of its columns, a gripper's too.
+        named = arm is not None and mapping.joints is not None
+        order = _order(recording, mapping, arm, []) if named else list(range(joints))
+        if len(answers.drive_gains) != len(order):
             raise LogError(
-                f"{where}: {len(answers.drive_gains)} drive gains for {joints} joints; give one per joint"
+                f"{where}: {len(answers.drive_gains)} drive gains for {len(order)} joints; give one per joint"
             )
-        gains = list(answers.drive_gains)
-        if arm is not None and mapping.joints is not None:
-            # Gains are given base to tip, as everywhere; the map's lists are in the order of its columns.
-            at = match(mapping.joints, arm.joint_names, where)
-            gains = [gains[at.index(j)] for j in range(joints)]
+        gains = [1.0] * joints
+        for j, gain in zip(order, answers.drive_gains, strict=True):
+            gains[j] = gain
         if _told(tau) != {"%"}:
             _require_like(recording, tau, "A", "--drive-gains")
         tau = replace(tau, unit=_said(tau.unit, "A"), gains=gains)
