@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet
 import pytest
 from foreign_logs import NAMES, assert_same, bag, libfranka, motion, refused, rtde
+from msgspec.structs import replace as replace_struct
 from synthetic import three_axis
 
 from armloop.cli import main
@@ -404,6 +405,23 @@ def test_a_header_or_a_row_of_words_is_no_remark(tmp_path, log, capsys):
     )
     words = table(tmp_path / "words.csv", log, "6" + 9 * ",ERR")
     assert "column q1, row 601 (line 602): not a number" in refused(["convert", str(words), *out], capsys)
+
+
+def test_currents_among_torques_are_not_taken_for_torques(tmp_path, log, capsys):
+    names = ["time [s]", *(f"q{j} [rad]" for j in (1, 2, 3)), *(f"v{j} [rad/s]" for j in (1, 2, 3))]
+    path = table(tmp_path / "log.csv", log, names=[*names, "tau1 [Nm]", "tau2 [A]", "tau3 [Nm]"])
+    line = refused(["convert", str(path), "--out", str(tmp_path / "out.parquet")], capsys)
+    assert "tau2 [A] is said to be a current, tau1 [Nm] a torque" in line
+    columns = [
+        QuantityMap([f"{kind}{j} [{unit}]" for j in (1, 2, 3)], unit)
+        for kind, unit in (("q", "rad"), ("v", "rad/s"))
+    ]
+    tau = QuantityMap(["tau1 [Nm]", "tau2 [A]", "tau3 [Nm]"], ["N*m", "A", "N*m"], gains=[1.0, 2.0, 1.0])
+    mapping = Mapping(TimeMap("time [s]", "s"), columns[0], tau, columns[1])
+    np.testing.assert_allclose(convert([path], mapping=mapping).log.tau, log.tau * [1, 2, 1], atol=1e-6)
+    twice = replace_struct(mapping, tau=replace_struct(tau, gains=2.0))
+    with pytest.raises(InputError, match=r"tau1 \[Nm\] is said to be in N\*m, and has a gain of 2"):
+        convert([path], mapping=twice)
 
 
 def test_gains_are_of_the_arms_joints_and_a_gripper_has_none(tmp_path, log):

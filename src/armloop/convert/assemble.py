@@ -131,6 +131,7 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     where = str(recording.path)
     joints, asked = mapping.n, []
     tau, q, v = mapping.tau, mapping.q, mapping.v
+    own = recording.kind == "motion log"  # whose header has no place for the unit of tau
     if answers.drive_gains is not None:
         # Gains are given base to tip, as everywhere; the map's lists are in the order of its columns, a gripper's too.
         named = arm is not None and mapping.joints is not None
@@ -144,14 +145,13 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
             gains[j] = gain
         if _told(tau) != {"%"}:
             _require_like(recording, tau, "A", "--drive-gains")
-        tau = replace(tau, unit=_said(tau.unit, "A"), gains=gains)
+        tau = replace(tau, unit="A" if own else _said(tau.unit, "A"), gains=gains)
     elif answers.tau_unit is not None:
         _require_like(recording, tau, answers.tau_unit, f"--tau-unit {answers.tau_unit}")
-        if not _told(tau) or recording.kind == "motion log":
-            tau = replace(tau, unit=answers.tau_unit)
+        tau = replace(tau, unit=answers.tau_unit if own else _said(tau.unit, answers.tau_unit))
     if answers.angle_unit is not None:
         told = {str(canonical(unit, "q")) for unit in q.units() if unit}
-        if told & {"rad", "deg"} - {answers.angle_unit}:
+        if None not in q.units() and told & {"rad", "deg"} - {answers.angle_unit}:
             raise LogError(
                 f"{where}: --angle-unit {answers.angle_unit}, but the {recording.kind} says itself that q is in "
                 f"{', '.join(sorted(told))}; leave the option out, or write the right unit in a --map"
@@ -164,8 +164,8 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
             "what tau holds (--tau-unit N*m; --tau-unit A; or --drive-gains k1,..,kn in N·m/A"
             f"{_sizes(recording, mapping, arm)})"
         )
-    elif canonical(tau.units()[0] or "", "tau") == "%" and tau.gains is None:
-        raise LogError(f"{where}: tau is in percent of a rating: give gains (N·m per percent) in a --map")
+    else:
+        _require_one_kind(tau, where)
     if None in q.units() or (v is not None and None in v.units()):
         asked.append("the unit of positions and velocities (--angle-unit rad or deg)")
     if mapping.time.rate is None and mapping.time.column is None:
@@ -184,6 +184,29 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
 def _told(tau: QuantityMap) -> set[str]:
     """The units of tau that a source or a map says."""
     return {unit for said in tau.units() if (unit := canonical(said or "", "tau")) is not None}
+
+
+def _require_one_kind(tau: QuantityMap, where: str) -> None:
+    """Raise ``LogError`` unless tau becomes the torque of every joint, or is the current of every joint."""
+    told = [str(canonical(unit or "", "tau")) for unit in tau.units()]
+    gains = [None] * len(told) if tau.gains is None else per_joint(tau.gains, len(told))
+    for name, unit, gain in zip(tau.names(), told, gains, strict=True):
+        if unit == "%" and gain is None:
+            raise LogError(
+                f"{where}: {name} is in percent of a rating: give gains (N·m per percent) in a --map"
+            )
+        if unit not in (*CURRENTS, "%") and gain not in (None, 1):
+            raise LogError(
+                f"{where}: {name} is said to be in {unit}, and has a gain of {gain:g}; gains make torques of A, mA or %: "
+                "say its right unit, or a gain of 1"
+            )
+    first = next((name for name, unit in zip(tau.names(), told, strict=True) if unit in CURRENTS), None)
+    other = next((name for name, unit in zip(tau.names(), told, strict=True) if unit not in CURRENTS), None)
+    if tau.gains is None and first is not None and other is not None:
+        raise LogError(
+            f"{where}: {first} is said to be a current, {other} a torque; give gains in a --map, N·m/A for a current and 1 "
+            "for a torque"
+        )
 
 
 def _require_like(recording: Recording, tau: QuantityMap, unit: str, option: str) -> None:
@@ -253,6 +276,8 @@ def rate_ratio(time: Array, recording: Recording, q: QuantityMap, v: QuantityMap
 
 
 def _said(unit: str | list[str] | None, answer: str) -> str | list[str]:
+    if isinstance(unit, list):
+        return [answer if one == UNSAID else one for one in unit]
     return answer if unit is None or unit == UNSAID else unit
 
 

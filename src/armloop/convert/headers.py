@@ -10,13 +10,21 @@ from collections.abc import Mapping as Mapping_
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
-from armloop.convert.units import canonical, spelt
-from armloop.convert.vocabulary import CURRENT, WANTED, WORDS, kind_of, words_of
+from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, TimeMap
+from armloop.convert.units import FACTORS, canonical, spelt
+from armloop.convert.vocabulary import WANTED, WORDS, kind_of, wanted, words_of
 
 _BRACKETS = str.maketrans("（）［］【】", "()[][]")
 _UNIT = re.compile(r"[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*)[\])]\s*$")
-_UNIT_WORDS = {"deg", "degrees", "rad", "mm", "nm", "amp", "ms", "us", "ns", "ma"}
+_UNIT_WORDS = {"deg", "degrees", "rad", "mm", "nm", "amp", "ma"}
+# Units that end a name, behind the joint's number or before it, and their rates: q1_deg, q_deg_1, v1_deg_s, posDeg.
+_ENDS = r"(?:[\W_]+|(?<=\d)|(?<=[a-z])(?=[A-Z]))((?i:{}))([\W_]*(?:per|p)?[\W_]*(?:s|sec))?(?=[\W_\d]*$)"
+_WORDED = re.compile(_ENDS.format("|".join(sorted(_UNIT_WORDS, key=len, reverse=True))))
+# A letter is one only beside other joints' units: q1_m is what was measured, but in metres beside q2_deg.
+_LETTERED = re.compile(_ENDS.format("m|n|a"))
+
+# By joint, the columns that may be its, and the unit of each as it is written.
+_Members = dict[str, list[tuple[str, str]]]
 
 
 @dataclass(frozen=True)
@@ -27,7 +35,7 @@ class Group:
     columns: tuple[str, ...]
     joints: tuple[str, ...]
     words: tuple[str, ...]
-    unit: str
+    units: tuple[str, ...]  # of each column as it is written, empty where it is not
     by_name: bool = False
 
 
@@ -91,14 +99,15 @@ def _in_order(group: Group, first: Group) -> Group | None:
         return group if both and len(group.columns) == len(first.columns) else None
     if set(group.joints) != set(first.joints):
         return None
-    columns = dict(zip(group.joints, group.columns, strict=True))
-    return replace(group, columns=tuple(columns[joint] for joint in first.joints), joints=first.joints)
+    at = [group.joints.index(joint) for joint in first.joints]
+    columns, units = (tuple(each[k] for k in at) for each in (group.columns, group.units))
+    return replace(group, columns=columns, joints=first.joints, units=units)
 
 
 def groups_of(
     columns: Sequence[str], joints: Sequence[str] = (), units: Mapping_[str, str] | None = None
 ) -> list[Group]:
-    """Columns that differ in the joint alone, by its number or its name."""
+    """Columns that differ in the joint, by its number or its name, and those that differ in its unit, too."""
     return _numbered(columns, units or {}) + _named(columns, joints, units or {})
 
 
@@ -109,32 +118,59 @@ def _split_unit(name: str, units: Mapping_[str, str]) -> tuple[str, str]:
     found = _UNIT.search(name.translate(_BRACKETS))
     if found:
         return name[: found.start()].strip(), found[1]
-    last = words_of(name)[-1:]
-    if last and last[0] in _UNIT_WORDS and len(words_of(name)) > 1:
-        return name, spelt(last[0])
-    return name, ""
+    return name, _without_last(name, _WORDED)[1]
+
+
+def _without_last(name: str, ends: re.Pattern[str]) -> tuple[str, str]:
+    """A name without the unit that is its last word, and the unit; nothing where no word of it is left then."""
+    found = ends.search(name)
+    if found is None or not words_of(name[: found.start()]):
+        return name, ""
+    return name[: found.start()] + name[found.end() :], spelt(found[1]) + ("/s" if found[2] else "")
+
+
+def _bare(name: str, unit: str) -> tuple[str, str]:
+    """A name without any unit at its end, and the unit: what is left is the same for joints of different units."""
+    for ends in (_WORDED, _LETTERED):
+        short, last = _without_last(name, ends)
+        if last:
+            return short, unit or last
+    return name, unit
+
+
+def _differing(members: _Members) -> dict[str, tuple[str, str]]:
+    """One column per joint and its unit where the joints' units differ, and may be those of one quantity; else none."""
+    each = {joint: columns[0] for joint, columns in members.items() if len(columns) == 1}
+    units = {unit for _, unit in each.values()}
+    known = [unit for unit in units if any(canonical(unit, kind) for kind in FACTORS)]
+    alike = any(all(canonical(unit, kind) for unit in known) for kind in FACTORS)
+    return each if len(units) > 1 and len(each) == len(members) and alike else {}
 
 
 def _numbered(columns: Sequence[str], units: Mapping_[str, str]) -> list[Group]:
     """Groups like ``q1, q2, …`` or ``state.q[0], state.q[1], …`` with consecutive numbers from 0 or 1."""
-    found: dict[tuple[str, str, str], dict[int, str]] = {}
+    found: dict[tuple[str, str, str], dict[str, tuple[str, str]]] = {}
+    stems: dict[tuple[int, str], _Members] = {}
     for column in columns:
         name, unit = _split_unit(column, units)
-        for place in re.finditer(r"\d+", name):
-            key = (name[: place.start()], name[place.end() :], unit)
-            found.setdefault(key, {}).setdefault(int(place[0]), column)
+        for k, place in enumerate(re.finditer(r"\d+", name)):
+            before, after, joint = name[: place.start()], name[place.end() :], str(int(place[0]))
+            found.setdefault((before, after, unit), {}).setdefault(joint, (column, unit))
+            stem, last = _bare(f"{before}0{after}", unit)
+            stems.setdefault((k, stem), {}).setdefault(joint, []).append((column, last))
+    fragments = [(before, after, members) for (before, after, _), members in found.items()]
+    for (k, stem), each in stems.items():
+        place = [*re.finditer(r"\d+", stem)][k]
+        fragments.append((stem[: place.start()], stem[place.end() :], _differing(each)))
     groups = []
-    for (before, after, unit), members in found.items():
-        numbers = sorted(members)
-        if numbers[0] not in (0, 1) or numbers != list(range(numbers[0], numbers[0] + len(numbers))):
+    for before, after, members in fragments:
+        numbers = sorted(map(int, members))
+        if not numbers or numbers[0] > 1 or numbers != list(range(numbers[0], numbers[0] + len(numbers))):
             continue
         words = [word for word in words_of(f"{before} {after}") if not word.isdecimal()]
         label = f"{before}{{{numbers[0]}..{numbers[-1]}}}{after}"
-        groups.append(
-            Group(
-                label, tuple(members[k] for k in numbers), tuple(str(k) for k in numbers), tuple(words), unit
-            )
-        )
+        names = tuple(map(str, numbers))
+        groups.append(_group(label, names, members, tuple(words)))
     most = max((len(group.columns) for group in groups), default=0)
     # A lone column with a 1 in its name is a group only where the arm may have one joint.
     return [group for group in groups if len(group.columns) > 1 or most == 1]
@@ -142,31 +178,50 @@ def _numbered(columns: Sequence[str], units: Mapping_[str, str]) -> list[Group]:
 
 def _named(columns: Sequence[str], joints: Sequence[str], units: Mapping_[str, str]) -> list[Group]:
     """Groups like ``elbow.pos, wrist.pos`` that share a beginning or an end, or hold the names of the arm's joints."""
-    found: dict[tuple[str, str], dict[str, str]] = {}
+    found: dict[tuple[str, str], dict[str, tuple[str, str]]] = {}
+    stems: dict[str, _Members] = {}
     for column in columns:
         name, unit = _split_unit(column, units)
-        hits = [joint for joint in joints if joint in name]
-        if hits:
-            joint = max(hits, key=len)
-            found.setdefault((name.replace(joint, " "), unit), {})[joint] = column
-            continue
-        for separator in ("/", ".", "__", " ", "_"):
-            first, _, last = name.rpartition(separator)
-            if first and last and not last.isdecimal() and not WANTED & set(words_of(first)):
-                found.setdefault((separator + last, unit), {})[first] = column
-                break
+        if (placed := _by_name(_without_last(name, _WORDED)[0], joints)) is not None:
+            found.setdefault((placed[0], unit), {})[placed[1]] = (column, unit)
+        bare, last = _bare(name, unit)
+        if (placed := _by_name(bare, joints)) is not None:
+            stems.setdefault(placed[0], {}).setdefault(placed[1], []).append((column, last))
+    fragments = [(key, members) for (key, _), members in found.items()]
     groups = []
-    for (key, unit), members in found.items():
+    for key, members in fragments + [(key, _differing(each)) for key, each in stems.items()]:
         if len(members) > 1 or (len(joints) == 1 and members):
             ordered = (
                 sorted(members, key=list(joints).index) if set(members) <= set(joints) else list(members)
             )
             words = tuple(word for word in words_of(key) if not word.isdecimal())
-            names = tuple(members[joint] for joint in ordered)
-            groups.append(
-                Group(f"*{key.strip()}", names, tuple(ordered), words, unit, set(members) == set(joints))
-            )
+            by_name = set(members) == set(joints)
+            groups.append(_group(f"*{key.strip()}", tuple(ordered), members, words, by_name))
     return groups
+
+
+def _by_name(name: str, joints: Sequence[str]) -> tuple[str, str] | None:
+    """What a column holds and the joint, by the names of the arm's joints or by what stands apart in its own."""
+    hits = [joint for joint in joints if joint in name]
+    if hits:
+        joint = max(hits, key=len)
+        return name.replace(joint, " "), joint
+    for separator in ("/", ".", "__", " ", "_"):
+        first, _, last = name.rpartition(separator)
+        if first and last and not last.isdecimal() and not wanted(first):
+            return separator + last, first
+    return None
+
+
+def _group(
+    key: str,
+    joints: tuple[str, ...],
+    members: Mapping_[str, tuple[str, str]],
+    words: tuple[str, ...],
+    by_name: bool = False,
+) -> Group:
+    columns, units = zip(*(members[joint] for joint in joints), strict=True)
+    return Group(key, columns, joints, words, units, by_name)
 
 
 def ranked(kind: str, groups: Sequence[Group]) -> list[Group]:
@@ -183,14 +238,14 @@ def ranked(kind: str, groups: Sequence[Group]) -> list[Group]:
     )
 
 
-def unit_of(kind: str, group: Group) -> str | None:
-    """The unit that the names of a group say, or None."""
-    said = canonical(group.unit, kind)
-    if said is None and group.unit and kind in ("v", "vdot"):
-        said = canonical(f"{group.unit}/s" + ("^2" if kind == "vdot" else ""), kind)
-    if said is None and kind == "tau" and CURRENT & set(group.words):
-        return None
-    return said
+def unit_of(kind: str, group: Group) -> str | list[str] | None:
+    """The unit that the names of a group say, one per joint where they differ, or None."""
+    rate = {"v": "/s", "vdot": "/s^2"}.get(kind)
+    each = [
+        canonical(unit, kind) or (canonical(unit + rate, kind) if unit and rate else None)
+        for unit in group.units
+    ]
+    return each[0] if len(set(each)) == 1 else [unit or UNSAID for unit in each]
 
 
 def time_of(columns: Sequence[str], units: Mapping_[str, str] | None = None) -> tuple[TimeMap, str]:
@@ -199,7 +254,10 @@ def time_of(columns: Sequence[str], units: Mapping_[str, str] | None = None) -> 
     for column in columns:
         name, unit = _split_unit(column, units)
         # a variable inside a struct or a topic: data.time, /joint_states/header/stamp
-        words = [word for word in words_of(re.split(r"[./]", name)[-1]) if word not in _UNIT_WORDS]
+        words = words_of(re.split(r"[./]", name)[-1])
+        if len(words) > 1 and canonical(words[-1], "time") is not None:
+            *words, last = words
+            unit = unit or last
         if words and all(word in WORDS["time"] for word in words):
             found.append((WORDS["time"].index(words[0]), column, canonical(unit, "time")))
     if not found:

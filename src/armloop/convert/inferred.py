@@ -166,5 +166,5 @@ def _forces(left: Sequence[str], n: int, groups: Sequence[Group], unsure: dict[s
     return []
 
 
-def _said(kind: str, group: Group | None, names: Sequence[str]) -> str | None:
+def _said(kind: str, group: Group | None, names: Sequence[str]) -> str | list[str] | None:
     return unit_of(kind, group) if group is not None and list(group.columns) == list(names) else None

@@ -34,10 +34,10 @@ def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str,
         time, doubt = clock_of(recording)
         mapping = replace(mapping, time=time)
         unsure |= {"time": doubt} if doubt else {}
-    if mapping.tau.unit is None:
+    if None in mapping.tau.units():
         unsure["tau.unit"] = "N*m for torques, A for motor currents (then with gains, in N·m/A)"
     for kind, quantity in (("q", mapping.q), ("v", mapping.v)):
-        if quantity is not None and quantity.unit is None and UNSAID not in quantity.names():
+        if quantity is not None and None in quantity.units() and UNSAID not in quantity.names():
             unsure[f"{kind}.unit"] = (
                 f"{_range(recording, quantity)}: rad or deg?"
                 if kind == "q"
@@ -87,8 +87,9 @@ def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> s
         lines.append(f"  columns: {_words(quantity.names())}")
         if UNSAID in quantity.names():
             lines += [f"  # columns: {_words(names)}" for names in alternatives(recording, mapping)]
-        lines.append(f"  unit: {_word(str(quantity.unit or UNSAID))}" + _doubt(unsure, f"{kind}.unit"))
-        if kind == "tau" and quantity.unit is None:
+        unit = _words(quantity.unit) if isinstance(quantity.unit, list) else _word(quantity.unit or UNSAID)
+        lines.append(f"  unit: {unit}" + _doubt(unsure, f"{kind}.unit"))
+        if kind == "tau" and None in quantity.units():
             lines.append("  # gains: [..]  N·m per A, one per joint, if these are currents")
     if "v" in unsure and mapping.v is None:
         lines.append(f"# v: unsure: {unsure['v']}")
@@ -106,6 +107,8 @@ def _rates_that_fit(recording: Recording, mapping: Mapping) -> str:
     """Which units of q and v go together, where a clock tells."""
     assert mapping.v is not None
     clock, said = mapping.time.column, mapping.q.unit
+    if isinstance(said, list):
+        return "as that of q, per s"
     if clock is not None and mapping.time.unit is not None and UNSAID not in mapping.q.names():
         plain = QuantityMap(mapping.q.columns, "rad"), QuantityMap(mapping.v.columns, "rad/s")
         ratio = rate_ratio(recording.columns[clock], recording, *plain) / FACTORS["time"][mapping.time.unit]
@@ -131,7 +134,8 @@ def _time_evidence(recording: Recording, mapping: Mapping) -> str:
 
 
 def _range(recording: Recording, quantity: QuantityMap) -> str:
-    cells = np.concatenate([recording.columns[name] for name in quantity.names()])
+    asked = [name for name, unit in zip(quantity.names(), quantity.units(), strict=True) if unit is None]
+    cells = np.concatenate([recording.columns[name] for name in asked])
     return f"from {np.nanmin(cells):.4g} to {np.nanmax(cells):.4g}"
 
 

@@ -1,0 +1,94 @@
+"""Units that headers say: each joint's own, in brackets or at the end of its name; no joint is lost for them."""
+
+import numpy as np
+import pytest
+from foreign_logs import assert_same, motion
+
+from armloop.cli import main
+from armloop.convert import Answers, convert
+from armloop.convert.headers import suggest
+from armloop.data.log import MotionLog, read_log
+
+DEGREE = np.pi / 180
+
+
+@pytest.fixture(scope="module")
+def log() -> MotionLog:
+    return motion()
+
+
+def write(path, names, log, *, per_unit):
+    """A table of a lift in other units than the joints that turn behind it."""
+    cells = np.column_stack([log.time, log.q / per_unit, log.v / per_unit, log.tau])
+    path.write_text("\n".join([",".join(names), *(",".join(f"{x:.12g}" for x in row) for row in cells)]))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("names", "per_unit"),
+    [
+        (["q1 [mm]", "q2 [deg]", "q3 [rad]", "v1 [mm/s]", "v2 [deg/s]", "v3 [rad/s]"], [1e-3, DEGREE, 1]),
+        (["q1_m", "q2_deg", "q3_deg", "v1_m_s", "v2_deg_s", "v3_deg_s"], [1, DEGREE, DEGREE]),
+        (["q_mm_1", "q_deg_2", "q_rad_3", "v_mm_s_1", "v_deg_s_2", "v_rad_s_3"], [1e-3, DEGREE, 1]),
+        (["a.pos(mm)", "b.pos(deg)", "c.pos(rad)", "a.vel(mm/s)", "b.vel(deg/s)", "c.vel(rad/s)"], [1e-3, DEGREE, 1]),
+        (["a_pos_mm", "b_pos_deg", "c_pos_deg", "a_vel_mm_s", "b_vel_deg_s", "c_vel_deg_s"], [1e-3, DEGREE, DEGREE]),
+    ],
+)  # fmt: skip
+def test_each_joints_own_unit_is_read(tmp_path, log, names, per_unit):
+    numbered = names[0].startswith("q")
+    torques = ["tau1 [N]", "tau2 [Nm]", "tau3 [Nm]"] if numbered else ["a.trq", "b.trq", "c.trq"]
+    torques = torques if "." in names[0] or numbered else [name.replace(".", "_") for name in torques]
+    path = write(tmp_path / "log.csv", ["time_s", *names, *torques], log, per_unit=np.array(per_unit))
+    assert_same(convert([path], answers=Answers(tau_unit="N*m")).log, log)
+
+
+def test_a_map_of_units_that_differ_reads_the_table(tmp_path, log, capsys):
+    names = [
+        "time [s]",
+        "q1 [mm]",
+        "q2",
+        "q3 [rad]",
+        "v1 [mm/s]",
+        "v2",
+        "v3 [rad/s]",
+        "tau1 [N]",
+        "tau2",
+        "tau3",
+    ]
+    path = write(tmp_path / "log.csv", names, log, per_unit=np.array([1e-3, DEGREE, 1]))
+    assert main(["convert", str(path), "--suggest", "--map", str(tmp_path / "map.yaml")]) == 0
+    text = (tmp_path / "map.yaml").read_text()
+    reach = np.degrees(log.q[:, 1])
+    assert (
+        f"unit: ['mm', '?', 'rad']  # unsure: from {reach.min():.4g} to {reach.max():.4g}: rad or deg?"
+        in text
+    )
+    for said in ("['mm', '?', 'rad']", "[mm/s, '?', rad/s]", "['N', '?', '?']"):
+        assert said in text
+        text = text.replace(
+            said, said.replace("'?'", "N*m" if "'N'" in said else "deg" + "/s" * ("/s" in said))
+        )
+    (tmp_path / "map.yaml").write_text(text)
+    out = tmp_path / "out.parquet"
+    assert main(["convert", str(path), "--map", str(tmp_path / "map.yaml"), "--out", str(out)]) == 0
+    assert_same(read_log(out), log)
+    capsys.readouterr()
+    # the command line answers for the joints that say nothing, and for them alone
+    answers = ["--angle-unit", "deg", "--tau-unit", "N*m"]
+    assert main(["convert", str(path), *answers, "--out", str(tmp_path / "again.parquet")]) == 0
+    assert_same(read_log(tmp_path / "again.parquet"), log)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["t", "q1 [rad]", "q2 [rad]", "q1 [deg]", "q2 [deg]", "tau1", "tau2"],  # each joint twice
+        ["t", "q1", "q2", "q1_m", "q2_m", "tau1", "tau2"],  # wanted and measured, not metres
+    ],
+)
+def test_one_quantity_in_two_columns_is_no_arm_of_more_joints(names):
+    found = suggest(names)
+    assert found.mapping is not None
+    assert len(found.mapping.q.names()) == 2
+    assert found.mapping.q.unit in (None, "rad", "deg")
+    assert "q" in found.unsure
