@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import TextIO
 
 from armloop.commands.arguments import Json, processes
@@ -63,6 +62,7 @@ class Watch(Json):
 def run(options: Watch) -> int:
     """Watch; the exit status is 3 if there is a new alarm; raises ``InputError`` where every log was set aside."""
     import sys
+    from dataclasses import replace
 
     from armloop.commands.shared import print_json, progress
     from armloop.util.files import write_text

@@ -125,7 +125,7 @@ def test_the_file_gives_the_same_model(result: Reconstruction, tmp_path):
     [
         ({"speeds": [1, 4]}, "speeds must be two joints from 1 to 3"),
         ({"speeds": [0, 2]}, "speeds must be two joints from 1 to 3"),
-        ({"degrees": [1, 0]}, "terms of 2 joints, the arm has 3"),
+        ({"degrees": [1, 0]}, "lagrangian: degrees of '.*': 2 joints, the arm has 3"),
     ],
 )
 def test_a_spoilt_file_is_refused(result: Reconstruction, tmp_path, change: dict, expected: str):
