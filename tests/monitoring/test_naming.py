@@ -32,6 +32,24 @@ def test_a_column_of_rounding_errors_explains_nothing() -> None:
     assert [one.place[0] for one in named] == ["coulomb_friction"]
 
 
+def test_a_coordinate_that_shows_nowhere_is_not_stated() -> None:
+    """A base that leans about the only axis that turns: of that angle nothing is known."""
+    columns = tuple(Column("gravity_tilt", None, None, k) for k in range(4))
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((8, 100, 4)) * [1.0, 0.0, 1.0, 1.0]
+    u = 0.05 * X[:, :, 0] + 0.02 * rng.standard_normal((8, 100))
+    normal = Normal(
+        np.einsum("unp,unq->upq", X, X), np.einsum("unp,un->up", X, u), np.einsum("un,un->u", u, u)
+    )
+    (named,) = name_change(healthy_model().arm, columns, None, normal)
+    roll, pitch = (named.parameters[key] for key in ("roll", "pitch"))
+    assert (
+        roll.value == pytest.approx(0.05, abs=4 * float(roll.std_error)) and 0 < float(roll.std_error) < 0.01
+    )
+    assert np.isnan(pitch.std_error)
+    assert "pitched by what the motion does not show about y" in named.words
+
+
 def test_what_warmth_makes_of_friction_is_taken_out_of_the_sums() -> None:
     rng = np.random.default_rng(0)
     columns = (

@@ -224,6 +224,10 @@ def _estimates(
     beta = ridge(problem.gram.sum(axis=0), problem.moment.sum(axis=0))[own]
     spread = (left - left.mean(axis=0))[:, own]
     covariance = (len(left) - 1) / len(left) * (spread.T @ spread)
+    # of a coordinate that shows nowhere nothing is known (a load's along the only axis that turns)
+    size = np.diag(problem.gram.sum(axis=0))[own]
+    unseen = np.flatnonzero(size <= _NOTHING * size.max())
+    covariance[unseen, unseen] = np.inf
     column = columns[places[place][0]]
     return column.effect, column.effect.estimates(arm, beta, covariance, column.shape)
 

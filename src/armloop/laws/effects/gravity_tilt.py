@@ -140,8 +140,13 @@ class GravityTilt(Effect):
         return all(abs(number(parameters[key].value)) < 0.6 for key in ("roll", "pitch"))
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
-        roll, pitch = (np.degrees(number(parameters[key].value)) for key in ("roll", "pitch"))
-        return f"the base is not level: rolled {roll:.2f}° about x and pitched {pitch:.2f}° about y"
+        def by(angle: Estimate) -> str:
+            # as of a roll about the only axis that turns
+            hidden = np.isnan(number(angle.std_error))
+            return "by what the motion does not show" if hidden else f"{np.degrees(number(angle.value)):.2f}°"
+
+        roll, pitch = (by(parameters[key]) for key in ("roll", "pitch"))
+        return f"the base is not level: rolled {roll} about x and pitched {pitch} about y"
 
 
 def with_first_moment(arm: Arm, inertial: Array, parameters: Mapping[str, Value]) -> Array:
