@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from armloop.convert.clocks import clock_seconds
 from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
-from armloop.convert.text import TextTable, clock_seconds, numbers_of, read_text
+from armloop.convert.text import TextTable, numbers_of, read_text
 from armloop.data.header import JOINT_COLUMN
 from armloop.data.log import told_unit
 from armloop.data.tables import PARQUET, is_number, kind_of

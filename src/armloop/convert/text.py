@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from armloop.convert.clocks import clock_seconds
 from armloop.convert.recording import Array
 from armloop.convert.units import FACTORS, canonical
 from armloop.data.tables import is_number
@@ -21,6 +22,10 @@ _NUMBER = re.compile(
 )
 
 
+# What remarks begin with, and headers that are one.
+_REMARK = re.compile(r"^ *(#|%|//)+ *")
+#: How a note of columns that are not read begins.
+LEFT_OUT = "columns left out"
 # Bytes that stand in no text.
 _CONTROL = [bytes([k]) for k in range(32) if k not in (9, 10, 12, 13)]
 
@@ -43,7 +48,7 @@ class TextTable:
 
     def left_out(self) -> list[str]:
         """What is to be said of the columns that are dropped."""
-        return [f"columns left out: {', '.join(self.dropped)}"] if self.dropped else []
+        return [f"{LEFT_OUT}: {', '.join(self.dropped)}"] if self.dropped else []
 
 
 def header_of(path: Path) -> list[str]:
@@ -78,7 +83,7 @@ def read_text(path: Path) -> TextTable:
         words = _is_header(lines[k], separator)
         if words and _names(lines[k], separator) == names:
             heads.append(k)
-        elif lines[k].lstrip().startswith("#"):
+        elif _REMARK.match(lines[k]):
             remarks.append(k)
         elif words and not _is_row(lines[k], separator, len(names)):
             if not _is_remark(lines, k, separator, len(names)):
@@ -96,11 +101,9 @@ def read_text(path: Path) -> TextTable:
     if not body:
         raise LogError(f"{path}: there are no rows below the header; a log has one row per sample")
     starts = sorted({int(np.searchsorted(numbers, head + 1)) for head in heads} - {len(body)})
-    decimal = (
-        "," if any(re.search(r"\d,\d", cell) for row in body[:50] for cell in _cells(row, separator)) else "."
-    )
+    decimal = _decimal(body, separator)
     if separator != "," or decimal != ".":
-        between = {"\t": "tabs", ";": "semicolons", " ": "blanks", ",": "commas"}[separator]
+        between = {"\t": "tabs", ";": "semicolons", "|": "bars", " ": "blanks", ",": "commas"}[separator]
         notes.append(f"{between} between the cells, decimal {'comma' if decimal == ',' else 'point'}")
     if separator == " ":
         body = [" ".join(line.split()) for line in body]
@@ -137,23 +140,23 @@ def read_text(path: Path) -> TextTable:
         if not name:
             continue
         kind = cells.type
-        texts = [cell.as_py() for cell in cells] if pyarrow.types.is_string(kind) else []
-        bad = next((text for text in texts if text is not None and not _NUMBER.match(text)), None)
         if name in columns:
             dropped.append(f"{name} (a second column of that name)")
             if not is_number(kind) or not np.array_equal(numbers_of(cells), columns[name], equal_nan=True):
                 twice.append(name)
         elif is_number(kind) or pyarrow.types.is_boolean(kind):
             columns[name] = numbers_of(cells)
-        elif bad is not None:
-            # A cell that is no number among numbers is a fault only where the column is needed.
-            columns[name] = np.array([_number(text) for text in texts])
-            if np.isnan(columns[name]).all():
-                del columns[name]
-                dropped.append(f"{name} (no numbers: {bad!r})")
         elif (seconds := clock_seconds(cells)) is not None:
             columns[name], units[name] = seconds, "s"
             notes.append(f"{name}: dates or times of day, counted in s from the first row")
+        elif pyarrow.types.is_string(kind):
+            # A cell that is no number among numbers is a fault only where the column is needed.
+            texts = cells.to_pylist()
+            numbers_in = np.array([_number(text, decimal) for text in texts])
+            if np.isnan(numbers_in).all():
+                dropped.append(f"{name} (no numbers: {next(filter(None, texts), '')[:40]!r})")
+            else:
+                columns[name] = numbers_in
         else:
             dropped.append(f"{name} (empty)" if pyarrow.types.is_null(kind) else f"{name} ({kind})")
     return TextTable(columns, starts, dropped, units, notes, twice, numbers)
@@ -166,25 +169,13 @@ def numbers_of(cells: Any) -> Array:
     return np.asarray(cells.cast(pyarrow.float64(), safe=False).to_numpy(), dtype=np.float64)
 
 
-def clock_seconds(cells: Any) -> Array | None:
-    """(N,) seconds from the first of pyarrow's dates or times of day; None where the cells are none or one is missing."""
-    import pyarrow
-
-    kind = cells.type
-    if cells.null_count or not (pyarrow.types.is_timestamp(kind) or pyarrow.types.is_time(kind)):
-        return None
-    per_second = {"s": 1, "ms": 1e3, "us": 1e6, "ns": 1e9}[kind.unit]
-    width = pyarrow.int32() if pyarrow.types.is_time32(kind) else pyarrow.int64()
-    ticks = cells.cast(width).to_numpy()
-    return np.asarray((ticks - ticks[0]) / per_second, dtype=np.float64)
-
-
 def _lines(path: Path) -> tuple[list[str], list[str]]:
     """The lines of a text file, and what is to be said of its encoding."""
     raw = path.read_bytes()
     encoding = "utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
     try:
-        return raw.decode(encoding).splitlines(), []
+        # some languages' spreadsheets write the minus that printers set
+        return raw.decode(encoding).replace("\u2212", "-").splitlines(), []
     except UnicodeDecodeError as error:
         # Numbers are the same in every extension of ASCII; only names suffer.
         if b"\0" not in raw and not any(mark in raw for mark in _CONTROL):
@@ -203,16 +194,24 @@ def _layout(lines: list[str]) -> tuple[str, int | None]:
     """
     for k in range(min(len(lines), 100)):
         below = [line for line in lines[k + 1 : k + 20] if line.strip()][:2]
-        for separator in ("\t", ";", ",", " "):
+        for separator in ("\t", ";", "|", ",", " "):
             names = _names(lines[k], separator) if lines[k].strip() else []
-            if len(names) < 2 or not _is_header(lines[k], separator):
+            if (
+                len(names) < 2
+                or any(_NUMBER.match(name) for name in names)
+                or not _is_header(lines[k], separator)
+            ):
                 continue
-            rows = below[1:] if below and _is_units(below[0], separator, len(names)) else below[:1]
-            if rows and _width(rows[0], separator) == len(names) and not _is_header(rows[0], separator):
+            rows = below[1:] if below and _is_units(below[0], separator, len(names)) else below
+            if (
+                rows
+                and all(_width(row, separator) == len(names) for row in rows)
+                and not _is_header(rows[0], separator)
+            ):
                 return separator, k
     for k, line in enumerate(lines[:100]):
         text = line.strip()
-        if not text or (text.startswith("#") and _separator(text) == " "):
+        if not text or (_REMARK.match(text) and _separator(text) == " "):
             continue
         separator = _separator(text)
         if _is_header(line, separator):
@@ -248,14 +247,15 @@ def _is_units(line: str, separator: str, width: int) -> bool:
 
 
 def _separator(line: str) -> str:
-    counts = {mark: line.count(mark) for mark in ("\t", ";", ",")}
+    counts = {mark: line.count(mark) for mark in ("\t", ";", "|", ",")}
     mark = max(counts, key=lambda key: counts[key])
     return mark if counts[mark] else " "
 
 
 def _names(line: str, separator: str) -> list[str]:
-    names = [cell.strip().strip('"').strip("'").strip() for cell in _cells(line, separator)]
-    names[0] = names[0].lstrip("# ")
+    cells = _cells(_REMARK.sub("", line), separator)
+    names = [cell.strip().strip('"').strip("'").strip() for cell in cells]
+    names[0] = _REMARK.sub("", names[0])
     return names if names[-1] else names[:-1]
 
 
@@ -265,9 +265,19 @@ def _is_header(line: str, separator: str) -> bool:
 
 
 def _is_row(line: str, separator: str, width: int) -> bool:
-    """Whether a line of words has a number among as many cells as a row: words are then what was not measured."""
-    cells = [cell for cell in _cells(line, separator) if cell.strip()]
-    return len(cells) == width and any(_NUMBER.match(cell) for cell in cells)
+    """Whether a line of words is a row: as many cells with a number among them, or numbers between other separators."""
+    cells = _cells(line, separator)
+    if len(cells) in (width, width + 1) and any(_NUMBER.match(cell) for cell in cells):
+        return True
+    parts = re.split(r"[;,|\s]+", line.strip())
+    return 2 * sum(bool(_NUMBER.match(part)) for part in parts) > len(parts)
+
+
+def _decimal(body: list[str], separator: str) -> str:
+    """A comma where some cell is a number with one; between commas such a cell stands in quotes."""
+    left, right = ('"', '"') if separator == "," else (rf'(?:^|[{separator}" ])', rf'(?=[{separator}" ]|$)')
+    number = re.compile(rf"{left}[-+]?\d*,\d+(?:[eE][-+]?\d+)?{right}", re.MULTILINE)
+    return "," if number.search("\n".join(body)) else "."
 
 
 def _is_remark(lines: list[str], k: int, separator: str, width: int) -> bool:
@@ -277,10 +287,12 @@ def _is_remark(lines: list[str], k: int, separator: str, width: int) -> bool:
     return below is None or (named < width == _width(below, separator))
 
 
-def _number(text: str | None) -> float:
+def _number(text: str | None, decimal: str) -> float:
     """The number that a text is, NaN where it is none: not Python's own 1_000 either, nor digits of another script."""
     try:
-        return float(text) if text is not None and text.isascii() and "_" not in text else float("nan")
+        if text is None or not text.isascii() or "_" in text or (decimal == "," and "." in text):
+            return float("nan")
+        return float(text.replace(decimal, "."))
     except ValueError:
         return float("nan")
 

@@ -1,0 +1,56 @@
+"""Clocks of tables: dates and times of day, as pyarrow reads them or as text, in seconds from the first row."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from armloop.convert.recording import Array
+
+# A date in whatever order, or none, and a time of day: 31.03.2024 23:59:58,25, 3/31/2024 11:59:58 PM, 23:59:58.250.
+_TIME_OF_DAY = re.compile(r"(?:([\d./-]+)[T ] ?)?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?) ?([AaPp]\.?[Mm]\.?)?")
+_DAY = 86400.0
+
+
+def clock_seconds(cells: Any) -> Array | None:
+    """(N,) seconds from the first of pyarrow's dates or times of day; None where the cells are none or one is missing."""
+    import pyarrow
+
+    kind = cells.type
+    if cells.null_count or not len(cells):
+        return None
+    if pyarrow.types.is_string(kind):
+        return _of_texts([cell.as_py() for cell in cells])
+    if not (pyarrow.types.is_timestamp(kind) or pyarrow.types.is_time(kind)):
+        return None
+    per_second = {"s": 1, "ms": 1e3, "us": 1e6, "ns": 1e9}[kind.unit]
+    width = pyarrow.int32() if pyarrow.types.is_time32(kind) else pyarrow.int64()
+    ticks = cells.cast(width).to_numpy()
+    seconds = np.asarray((ticks - ticks[0]) / per_second, dtype=np.float64)
+    return _past_midnight(seconds) if pyarrow.types.is_time(kind) else seconds
+
+
+def _of_texts(texts: Sequence[str]) -> Array | None:
+    """(N,) seconds of texts that all end in a time of day; the date before it, in any order, has to change at midnight."""
+    seconds = np.empty(len(texts))
+    dates = []
+    for row, text in enumerate(texts):
+        found = _TIME_OF_DAY.fullmatch(text.strip())
+        if found is None:
+            return None
+        date, hours, minutes, rest, half = found.groups()
+        hour = int(hours) if half is None else int(hours) % 12 + 12 * (half[0] in "Pp")
+        seconds[row] = 3600 * hour + 60 * int(minutes) + float(rest.replace(",", "."))
+        dates.append(date)
+    if not any(dates):
+        return _past_midnight(seconds - seconds[0])
+    days = np.cumsum([0, *(one != other for one, other in zip(dates[1:], dates[:-1], strict=True))])
+    return np.asarray(seconds - seconds[0] + _DAY * days)
+
+
+def _past_midnight(seconds: Array) -> Array:
+    """Times of day that go on past midnight, where they fall by more than half a day."""
+    return np.asarray(seconds + _DAY * np.cumsum(np.diff(seconds, prepend=seconds[:1]) < -0.5 * _DAY))
