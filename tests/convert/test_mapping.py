@@ -172,10 +172,10 @@ def test_a_bad_map_is_told_in_a_line(tmp_path, log, capsys, case):
 def test_one_unit_of_angles_for_all_joints_does_not_scale_one_that_slides(tmp_path, capsys):
     q = np.cumsum(np.random.default_rng(3).normal(0.0, 0.01, (200, 4)), axis=0)
     table = tmp_path / "table.csv"
-    names = ["t", *(f"{stem}{j}" for stem in ("p", "i") for j in range(1, 5))]
+    names = ["t", *(f"{stem}{j}" for stem in ("p", "i", "a") for j in range(1, 5))]
     np.savetxt(
         table,
-        np.column_stack([0.01 * np.arange(200), q, q]),
+        np.column_stack([0.01 * np.arange(200), q, q, q]),
         delimiter=",",
         header=",".join(names),
         comments="",
@@ -190,7 +190,7 @@ def test_one_unit_of_angles_for_all_joints_does_not_scale_one_that_slides(tmp_pa
     units = ", ".join("deg" if joint.kind == "revolute" else "mm" for joint in load_arm("scara").joints)
     (tmp_path / "map.yaml").write_text(tau + f"q: {{columns: 'p{{1..4}}', unit: [{units}]}}\n")
     assert main([*line, str(tmp_path / "o.csv")]) == 0
-    both = f"q: {{columns: 'p{{1..4}}', unit: [{units}]}}\nvdot: {{columns: 'i{{1..4}}', unit: deg/s^2}}\n"
+    both = f"q: {{columns: 'p{{1..4}}', unit: [{units}]}}\nvdot: {{columns: 'a{{1..4}}', unit: deg/s^2}}\n"
     (tmp_path / "map.yaml").write_text(tau + both)
     assert f"vdot of {slides.name} is said to be in deg/s^2, but this joint slides" in refused(
         [*line, "p.csv"], capsys
@@ -232,3 +232,15 @@ def test_what_a_source_says_of_tau_is_not_overruled(tmp_path, capsys):
     )
     assert main([*table("%", 100.0), "--drive-gains", "2,3,4"]) == 0
     np.testing.assert_allclose(torques(), 100.0 * q * [2, 3, 4], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("q", "says"),
+    [("[q1, q1]", "q: column q1 is q of joint 1 already"), ("[time, q1]", "q: column time is time already")],
+)
+def test_a_column_is_one_quantity_of_one_joint(tmp_path, log, capsys, q, says):
+    write_log(tmp_path / "log.csv", log)
+    rest = "time: {column: time, unit: s}\ntau: {columns: 'tau{1..2}', unit: N*m}\n"
+    (tmp_path / "map.yaml").write_text(f"{rest}q: {{columns: {q}, unit: rad}}\n")
+    line = ["convert", str(tmp_path / "log.csv"), "--map", str(tmp_path / "map.yaml"), "--out", "o.csv"]
+    assert says in refused(line, capsys)

@@ -150,6 +150,14 @@ def check_map(mapping: Mapping, where: str) -> None:
             raise InputError(f"{where}: {name}: gains belong to tau alone (N·m per A, or per % of a rating)")
         if quantity.gains is not None and not all(gain > 0 for gain in per_joint(quantity.gains, n)):
             raise InputError(f"{where}: tau: every gain must be positive; say a direction with sign")
+    taken = {mapping.time.column or "": "time"}
+    for kind, quantity in mapping.quantities().items():
+        for j, name in enumerate(quantity.names(), start=1):
+            if name in taken:
+                raise InputError(
+                    f"{where}: {kind}: column {name} is {taken[name]} already; each column is one quantity of one joint"
+                )
+            taken[name] = f"{kind} of joint {j}"
     if isinstance(mapping.keep, str) and mapping.keep != "all":
         raise InputError(f"{where}: keep is {mapping.keep!r}; it must be all or a list of columns")
 
