@@ -236,3 +236,31 @@ def test_a_derivative_is_told_from_friction(log, seed):
 )
 def test_words_of_a_name(name, words):
     assert words_of(name) == words.split()
+
+
+def test_units_are_read_of_columns_that_only_their_values_tell(tmp_path, log):
+    names = ["t [ms]", "pos [deg]", "rate [deg/s]", "load [Nm]"]
+    cells = [1e3 * log.time, np.degrees(log.q[:, 0]), np.degrees(log.v[:, 0]), log.tau[:, 0]]
+    path, place, out = (
+        write(tmp_path / "log.csv", names, cells, ","),
+        tmp_path / "map.yaml",
+        tmp_path / "out.csv",
+    )
+    assert main(["convert", str(path), "--suggest", "--map", str(place)]) == 0
+    assert "'?'" not in place.read_text()
+    assert main(["convert", str(path), "--map", str(place), "--out", str(out)]) == 0
+    np.testing.assert_allclose(read_log(out).q[:, 0], log.q[:, 0], atol=1e-7)
+
+
+def test_velocities_are_not_suggested_for_positions_that_cannot_be_read(tmp_path, log):
+    names = ["time [s]", *per_joint("q{}", "v{} [rad/s]", "tau{} [Nm]")]
+    path, place = (
+        write(tmp_path / "log.csv", names, [log.time, log.q, log.v, log.tau], ","),
+        tmp_path / "map.yaml",
+    )
+    first, *lines = path.read_text().splitlines()
+    path.write_text(
+        "\n".join([first, *(re.sub(r"^([^,]*,[^,]*),[^,]*", r"\1,lost", line) for line in lines)])
+    )
+    assert main(["convert", str(path), "--suggest", "--map", str(place)]) == 0
+    assert "which of q1, q3 are positions?" in place.read_text()

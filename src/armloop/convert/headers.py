@@ -70,7 +70,7 @@ def suggest(
                 return Suggestion(None, {"columns": f"no {len(q.columns)} columns of torque go with {q.key}"})
             continue
         group = fitting[0]
-        fields[kind] = QuantityMap(list(group.columns), unit_of(kind, group))
+        fields[kind] = QuantityMap(list(group.columns), unit_of(kind, group.units))
         if len(fitting) > 1:
             unsure[kind] = "also possible: " + ", ".join(other.key for other in fitting[1:4])
     time, doubt = time_of(columns, units)
@@ -111,7 +111,7 @@ def groups_of(
     return _numbered(columns, units or {}) + _named(columns, joints, units or {})
 
 
-def _split_unit(name: str, units: Mapping_[str, str]) -> tuple[str, str]:
+def split_unit(name: str, units: Mapping_[str, str]) -> tuple[str, str]:
     """A name without its unit, and the unit as it is written: in a row of its own, in brackets, or as the last word."""
     if units.get(name):
         return name, units[name]
@@ -152,7 +152,7 @@ def _numbered(columns: Sequence[str], units: Mapping_[str, str]) -> list[Group]:
     found: dict[tuple[str, str, str], dict[str, tuple[str, str]]] = {}
     stems: dict[tuple[int, str], _Members] = {}
     for column in columns:
-        name, unit = _split_unit(column, units)
+        name, unit = split_unit(column, units)
         for k, place in enumerate(re.finditer(r"\d+", name)):
             before, after, joint = name[: place.start()], name[place.end() :], str(int(place[0]))
             found.setdefault((before, after, unit), {}).setdefault(joint, (column, unit))
@@ -181,7 +181,7 @@ def _named(columns: Sequence[str], joints: Sequence[str], units: Mapping_[str, s
     found: dict[tuple[str, str], dict[str, tuple[str, str]]] = {}
     stems: dict[str, _Members] = {}
     for column in columns:
-        name, unit = _split_unit(column, units)
+        name, unit = split_unit(column, units)
         if (placed := _by_name(_without_last(name, _WORDED)[0], joints)) is not None:
             found.setdefault((placed[0], unit), {})[placed[1]] = (column, unit)
         bare, last = _bare(name, unit)
@@ -238,12 +238,11 @@ def ranked(kind: str, groups: Sequence[Group]) -> list[Group]:
     )
 
 
-def unit_of(kind: str, group: Group) -> str | list[str] | None:
-    """The unit that the names of a group say, one per joint where they differ, or None."""
+def unit_of(kind: str, said: Sequence[str]) -> str | list[str] | None:
+    """The unit of a quantity's columns by what is written of each, one per column where they differ, or None."""
     rate = {"v": "/s", "vdot": "/s^2"}.get(kind)
     each = [
-        canonical(unit, kind) or (canonical(unit + rate, kind) if unit and rate else None)
-        for unit in group.units
+        canonical(unit, kind) or (canonical(unit + rate, kind) if unit and rate else None) for unit in said
     ]
     return each[0] if len(set(each)) == 1 else [unit or UNSAID for unit in each]
 
@@ -252,7 +251,7 @@ def time_of(columns: Sequence[str], units: Mapping_[str, str] | None = None) -> 
     """The column of time by its name, if one is named so, and what is not sure of it."""
     found, units = [], units or {}
     for column in columns:
-        name, unit = _split_unit(column, units)
+        name, unit = split_unit(column, units)
         # a variable inside a struct or a topic: data.time, /joint_states/header/stamp
         words = words_of(re.split(r"[./]", name)[-1])
         if len(words) > 1 and canonical(words[-1], "time") is not None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from armloop.convert.evidence import Evidence, evidence
-from armloop.convert.headers import Group, groups_of, ranked, time_of, unit_of
+from armloop.convert.headers import Group, groups_of, ranked, split_unit, time_of, unit_of
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Recording, some
 from armloop.convert.units import canonical
@@ -30,16 +30,15 @@ def inferred(recording: Recording, joints: Sequence[str]) -> tuple[Mapping, dict
     groups = groups_of(list(recording.columns), joints, recording.units)
     named = {kind: next(iter(ranked(kind, groups)), None) for kind in ("q", "v", "tau")}
     free = [name for name in recording.columns if name not in seen.used and name != time.column]
-    tau = _members(named["tau"])
-    q = _members(named["q"]) or _positions(seen, tau, free, groups, joints, unsure)
-    v = _members(named["v"])
+    tau, v = _members(named["tau"]), _members(named["v"])
+    q = _members(named["q"]) or _positions(seen, tau, v, free, groups, joints, unsure)
     if q and (not v or len(v) != len(q)):
         v = _velocities(seen, q, tau, unsure)
     left = [name for name in free if name not in {*q, *v}]
     if not tau or (q and len(tau) != len(q)):
         tau = _forces(left, len(q), groups, unsure)
     fields = {
-        kind: QuantityMap(names or [UNSAID], _said(kind, named.get(kind), names))
+        kind: QuantityMap(names or [UNSAID], _unit(kind, named[kind], names, recording))
         for kind, names in (("q", q), ("tau", tau), ("v", v))
     }
     if not v:
@@ -106,17 +105,21 @@ def _members(group: Group | None) -> list[str]:
 def _positions(
     seen: Evidence,
     tau: Sequence[str],
+    v: Sequence[str],
     free: Sequence[str],
     groups: Sequence[Group],
     joints: Sequence[str],
     unsure: dict[str, str],
 ) -> list[str]:
     """Columns that have a derivative among the others and are none themselves, else the one group that may be them."""
-    derivatives = {rate for rate, *_ in seen.rates.values()}
+    derivatives, away = {rate for rate, *_ in seen.rates.values()}, {*tau, *v}
     found = [
         name
         for name in free
-        if name in seen.rates and name not in derivatives and not {name, seen.rates[name][0]} & {*tau}
+        if name in seen.rates
+        and name not in derivatives
+        and name not in away
+        and seen.rates[name][0] not in tau
     ]
     count = len(tau) or len(joints)
     if found and (not count or len(found) == count):
@@ -128,14 +131,12 @@ def _positions(
     fitting = [
         group.columns
         for group in groups
-        if len(group.columns) == count
-        and {*group.columns} <= {*free} - {*tau}
-        and not WANTED & {*group.words}
+        if len(group.columns) == count and {*group.columns} <= {*free} - away and not WANTED & {*group.words}
     ]
     if len(fitting) == 1:
         unsure["q"] = f"the only {count} columns of one kind that are left"
         return list(fitting[0])
-    may = [name for name in free if name not in tau]
+    may = [name for name in free if name not in away]
     unsure["q"] = f"which of {some(may)} are positions? one per joint, base to tip"
     return []
 
@@ -166,5 +167,9 @@ def _forces(left: Sequence[str], n: int, groups: Sequence[Group], unsure: dict[s
     return []
 
 
-def _said(kind: str, group: Group | None, names: Sequence[str]) -> str | list[str] | None:
-    return unit_of(kind, group) if group is not None and list(group.columns) == list(names) else None
+def _unit(
+    kind: str, group: Group | None, names: Sequence[str], recording: Recording
+) -> str | list[str] | None:
+    if group is not None and list(group.columns) == list(names):
+        return unit_of(kind, group.units)
+    return unit_of(kind, [split_unit(name, recording.units)[1] for name in names]) if names else None

@@ -45,7 +45,8 @@ def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str,
             )
     if mapping.time.column is not None and mapping.time.unit is None:
         unsure["time.unit"] = _time_evidence(recording, mapping)
-    if mapping.v is not None and not {"q.unit", "v.unit", "time.unit", "v"} & {*unsure}:
+    known = UNSAID not in mapping.q.names()
+    if mapping.v is not None and known and not {"q.unit", "v.unit", "time.unit", "v"} & {*unsure}:
         unsure |= _contradiction(recording, mapping, mapping.v)
     return mapping, unsure
 
@@ -125,7 +126,8 @@ def _time_evidence(recording: Recording, mapping: Mapping) -> str:
     time = recording.columns[mapping.time.column]
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     text = f"samples are {step:.6g} apart"
-    if mapping.v is not None and mapping.v.unit is None and mapping.q.unit is None:
+    unknown = mapping.q.unit is None and UNSAID not in mapping.q.names()
+    if mapping.v is not None and mapping.v.unit is None and unknown:
         # With the rates of the positions' unit, whichever it is.
         plain = QuantityMap(mapping.q.columns, "rad"), QuantityMap(mapping.v.columns, RATES["rad"])
         if unit := time_unit(rate_ratio(time, recording, *plain)):
