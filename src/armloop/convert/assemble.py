@@ -169,7 +169,8 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     if None in q.units() or (v is not None and None in v.units()):
         asked.append("the unit of positions and velocities (--angle-unit rad or deg)")
     if mapping.time.rate is None and mapping.time.column is None:
-        asked.append("the time (no column of it was found; --map with time: {rate: HZ})")
+        left = recording.left_out()
+        asked.append(f"the time (no column of it was found{left}; --map with time: {{rate: HZ}})")
     if asked:
         raise LogError(
             f"{where}: the {recording.kind} does not say {' nor '.join(asked)}; say it, or answer in the map that "

@@ -12,7 +12,6 @@ from armloop.convert.assemble import Answers, Part, joined, part
 from armloop.convert.detect import read_source
 from armloop.convert.mapping import Mapping
 from armloop.convert.recording import Array, Recording
-from armloop.convert.text import LEFT_OUT
 from armloop.data.log import MotionLog, check_log
 from armloop.data.repeats import same_measurement
 from armloop.robot.arm import Arm
@@ -67,9 +66,8 @@ def convert(
         chosen = mapping or recording.mapping
         if chosen is None:
             why = recording.unsure.get("columns", "the columns are not recognised")
-            left = "".join(f" ({note})" for note in recording.notes if note.startswith(LEFT_OUT))
             raise LogError(
-                f"{recording.path}: {why}{left}; write a map (--suggest starts one) and give it with --map"
+                f"{recording.path}: {why}{recording.left_out()}; write a map (--suggest starts one) and give it with --map"
             )
         if mapping is None and recording.kind == "table" and recording.unsure:
             first = next(iter(f"{field}: {text}" for field, text in recording.unsure.items()))

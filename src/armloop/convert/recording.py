@@ -37,6 +37,10 @@ class Recording:
         """A row for a message, from 0 here and from 1 there, with its line in a text file."""
         return f"{self.rows} {row + 1}" + (f" (line {self.lines[row]})" if self.lines else "")
 
+    def left_out(self) -> str:
+        """What was left of the source, in brackets for a message of what it lacks."""
+        return "".join(f" ({note})" for note in self.notes if "left out: " in note)
+
     @property
     def samples(self) -> int:
         """The number of rows."""

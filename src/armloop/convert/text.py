@@ -24,8 +24,6 @@ _NUMBER = re.compile(
 
 # What remarks begin with, and headers that are one.
 _REMARK = re.compile(r"^ *(#|%|//)+ *")
-#: How a note of columns that are not read begins.
-LEFT_OUT = "columns left out"
 # Bytes that stand in no text.
 _CONTROL = [bytes([k]) for k in range(32) if k not in (9, 10, 12, 13)]
 
@@ -48,7 +46,7 @@ class TextTable:
 
     def left_out(self) -> list[str]:
         """What is to be said of the columns that are dropped."""
-        return [f"{LEFT_OUT}: {', '.join(self.dropped)}"] if self.dropped else []
+        return [f"columns left out: {', '.join(self.dropped)}"] if self.dropped else []
 
 
 def header_of(path: Path) -> list[str]:
