@@ -23,7 +23,7 @@ def told(
     model: ReconstructedModel, seed: int, *laws: Law, part: float = 0.08
 ) -> tuple[Diagnosis, list[float]]:
     """The diagnosis of a run with laws at joint 2, each of so much of its torque; and their coefficients."""
-    log = run(seed, 40.0)
+    log = run(seed, 30.0)
     shapes = [law(log.q, log.v) for law in laws]
     size = np.sqrt(np.mean(log.tau[:, 1] ** 2))
     coefficients = [float(part * size / np.sqrt(np.mean(x**2))) for x in shapes]
@@ -63,11 +63,3 @@ def test_no_listed_effect_stands_in_for_a_part_of_a_law_that_is_not_met(model: R
     """A wave that the library lacks: terms that come near it leave several times the baseline."""
     found, _ = told(model, 1, lambda q, v: np.sin(3 * q[:, 0] - q[:, 1]))
     assert (found.verdict, found.outcome.found) == ("unlisted_effect", [])
-
-
-def test_a_law_alone_has_no_listed_effect_beside_it(model: ReconstructedModel) -> None:
-    found, truth = told(model, 2, lambda q, v: np.sin(2 * q[:, 0]) * v[:, 1] ** 2)
-    assert (found.verdict, found.outcome.found) == ("unlisted_effect", [])
-    law = found.unlisted
-    assert law is not None
-    assert float(law.parameters["sin(2*q1)*v2^2"].value) == pytest.approx(truth[0], rel=0.02)

@@ -116,6 +116,10 @@ class PlainFits:
         columns = np.concatenate([base.columns(arm, table.motion), friction], axis=2)
         return replace(self, arm=arm, base=base, table=replace(table, columns=columns))
 
+    def every(self, step: int) -> Self:
+        """The same at every so manieth instant."""
+        return replace(self, table=self.table.every(step))
+
     def sprung(self) -> Self:
         """The same with a spring at every joint."""
         q = self.table.motion.q[:, :, None] * np.eye(self.arm.n)

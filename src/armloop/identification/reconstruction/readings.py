@@ -32,6 +32,8 @@ _ORDER, _UNIT = 3.0, 1.5
 #: nothing. Measured arms that were read rightly came to 1.04, 1.00 and 0.98; with laws of another kind, as strong as
 #: gravity, simulated ones to 1.5, 1.1 and 0.7.
 _SENSE = (2.0, 1.2, 0.8)
+#: Sets of joints are many: of every so manieth instant each must first explain so many times as much.
+_SCREENED, _PROMISING = 3, 1.1
 #: Arms of so many joints are tried with every set of them counting the other way; larger ones with any one or two.
 _EVERY_SENSE = 7
 #: Readings whose gains are as near as this part are as good; the first, of the fewest joints, is meant.
@@ -160,10 +162,16 @@ def meant(problem: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float, plain
         return ""
     n = len(plain.relative)
     found: list[tuple[Reading, float]] = []
+    few = problem.every(_SCREENED)
+    first = few.fit(np.ones(n), np.arange(n))
     sprung = problem.sprung().fit(np.ones(n), np.arange(n))
     down = better_mounting(problem, plain)
     mounted = [Reading(np.arange(n), down=down)] if down else []
     for reading in (*mounted, *readings(problem.arm)):
+        if reading.turned:
+            quick = few.read(reading.order, reading.signs).fit(np.ones(n), np.arange(n))
+            if first.over(quick) < _PROMISING:
+                continue
         read = reading.problem(problem, logs, cutoff_hz)
         if read is None:
             continue
