@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armloop.convert.joints import match
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
@@ -20,14 +21,14 @@ from armloop.convert.recording import Array, Recording
 from armloop.util.errors import LogError
 
 JOINT_STATE = "JointState"
-# Messages of a topic that are looked at for the arm's joints; a gripper's driver may share the topic.
+# Messages of a topic that are looked at: for the arm's joints, as a gripper's driver may share it, and beside a jump.
 _FIRST = 100
 
 
 def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> Recording:
     """Read the joint states of one bag, of ``topic`` where it has several; raises ``LogError`` where there are none.
 
-    Messages without the joints ``wanted`` (of a gripper's driver) are left out; None takes the names of the first message.
+    Messages without the joints ``wanted`` (of a gripper's driver) are left out; None takes all, which name the same joints.
     """
     import msgspec
     from rosbags.highlevel import AnyReader, AnyReaderError
@@ -38,6 +39,7 @@ def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> 
     rows: list[tuple[Array, Array, Array]] = []
     names: tuple[str, ...] = ()
     others: dict[str, None] = {}
+    without = 0
     fault: LogError | None = None
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
@@ -53,8 +55,15 @@ def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> 
                         order[found] = match(found, wanted or names or found, f"{path}: {chosen}")
                     except LogError as error:
                         order[found], fault = None, error
+                    if wanted is None and names and {*found} != {*names}:
+                        raise LogError(
+                            f"{path}: {chosen}: some messages name the joints {', '.join(names)}, others "
+                            f"{', '.join(found) or 'none'}; give --arm with its URDF, which says whose are the arm's"
+                        )
                 index = order[found]
                 if index is None:
+                    without += 1
+                    others |= dict.fromkeys(found)
                     continue
                 names = names or tuple(found[k] for k in index)
                 others |= dict.fromkeys(name for k, name in enumerate(found) if k not in index)
@@ -91,23 +100,59 @@ def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> 
     notes = [f"{len(rows)} messages of {chosen}"]
     if left:
         notes.append(f"topics not read: {', '.join(left)}")
-    if others:
-        notes.append(f"joints that are not the arm's, left out: {', '.join(sorted(others))}")
-    clock = np.array(stamps, dtype=np.int64)
+    if without:
+        notes.append(f"messages without all joints of the arm, left out: {without}")
+    if strange := sorted(others.keys() - {*names}):
+        notes.append(f"joints that are not the arm's, left out: {', '.join(strange)}")
+    clock, recorded = np.array(stamps, dtype=np.int64), np.array(received, dtype=np.int64)
     if not (clock > 0).any() or (np.diff(clock) == 0).all():
-        clock = np.array(received, dtype=np.int64)
+        clock = recorded
         notes.append("time is when a message was recorded: the headers hold no stamps")
-    return _recording(path, clock, rows, names, notes)
+    stamped = np.flatnonzero(clock > 0)
+    if len(stamped) < len(clock):
+        notes.append(f"messages without a stamp, left out: {len(clock) - len(stamped)}")
+    turn, starts = _in_turn(clock[stamped], recorded[stamped], notes)
+    kept = stamped[turn]
+    return _recording(path, clock[kept], [rows[int(k)] for k in kept], names, starts, notes)
+
+
+def _in_turn(clock: Any, received: Any, notes: list[str]) -> tuple[NDArray[np.intp], list[int]]:
+    """Messages in the order of their stamps, and where a clock that was set back begins anew among them.
+
+    One that is late comes later than its stamp says; behind a clock that was set back all do.
+    """
+    delay = received - clock
+    late = np.flatnonzero(np.diff(clock) < 0) + 1
+    back = [
+        int(k)
+        for k in late
+        if np.median(delay[k : k + _FIRST]) - np.median(delay[max(0, k - _FIRST) : k])
+        > (clock[k - 1] - clock[k]) / 2
+    ]
+    starts = [0, *back]
+    for k in back:
+        notes.append(
+            f"message {k + 1}: the clock of the stamps was set back by {(clock[k - 1] - clock[k]) * 1e-9:.3g} s; "
+            "a run begins there"
+        )
+    if len(late) > len(back):
+        notes.append(
+            f"{len(late) - len(back)} messages were recorded out of turn; they are sorted by their stamps"
+        )
+    parts = pairwise([*starts, len(clock)])
+    return np.concatenate(
+        [first + np.argsort(clock[first:last], kind="stable") for first, last in parts]
+    ), starts
 
 
 def _recording(
-    path: Path, clock: Any, rows: list[tuple[Array, Array, Array]], names: tuple[str, ...], notes: list[str]
+    path: Path,
+    clock: Any,
+    rows: list[tuple[Array, Array, Array]],
+    names: tuple[str, ...],
+    starts: list[int],
+    notes: list[str],
 ) -> Recording:
-    late = np.flatnonzero(np.diff(clock) < 0)
-    if len(late):
-        by_time = np.argsort(clock, kind="stable")
-        clock, rows = clock[by_time], [rows[int(k)] for k in by_time]
-        notes.append(f"{len(late)} messages were recorded out of turn; they are sorted by their stamps")
     columns = {"stamp": (clock - clock[0]) * 1e-9}
     fields = {}
     for k, (field, kind) in enumerate((("position", "q"), ("velocity", "v"), ("effort", "tau"))):
@@ -130,6 +175,7 @@ def _recording(
         columns,
         mapping,
         named=True,
+        starts=starts,
         epoch=float(clock[0]) * 1e-9,
         rows="message",
         notes=notes,
