@@ -452,3 +452,17 @@ def test_a_log_of_currents_converted_once_more_stays_one(tmp_path, log, capsys):
     gained = convert([again], answers=Answers(drive_gains=[2.0, 3.0, 4.0])).log
     assert gained.tau_unit == "N*m"
     np.testing.assert_allclose(gained.tau, log.tau * [2, 3, 4], atol=1e-6)
+
+
+@pytest.mark.parametrize("cell", ["---", None])
+def test_a_joint_whose_position_cannot_be_read_is_not_lost(tmp_path, log, capsys, cell):
+    paths = rtde(tmp_path / "rtde.csv", log, ","), libfranka(tmp_path / "franka.csv", log, old=False, parts=1)
+    for path, name in zip(paths, ("actual_q_2", "state.q[2]"), strict=True):
+        lines = [line.split(",") for line in path.read_text().splitlines()]
+        k = lines[0].index(name)
+        for line in lines[bool(cell) :]:
+            line[k : k + 1] = [cell] if cell else []
+        path.write_text("\n".join(map(",".join, lines)) + "\n")
+        line = refused(["convert", str(path), "--out", str(tmp_path / "out.csv")], capsys)
+        assert f"no column {name}, which q of joint 3 needs" in line
+        assert (f"{name} (no numbers: '---')" in line) == bool(cell)

@@ -336,7 +336,7 @@ def _cells(recording: Recording, name: str, needed: str, correct: str) -> Array:
     cells = recording.columns.get(name)
     if cells is None:
         raise LogError(
-            f"{recording.path}: no column {name}{needed}; there are: {some(recording.columns, 12)}"
+            f"{recording.path}: no column {name}{needed}{recording.left_out()}; there are: {some(recording.columns, 12)}"
         )
     bad = np.flatnonzero(~np.isfinite(cells))
     if len(bad):

@@ -28,7 +28,8 @@ def read_libfranka(path: Path) -> Recording:
     table = read_text(path)
     columns = table.columns
     prefix = next(p for p in _PREFIXES if f"{p}q[0]" in columns)
-    n = sum(f"{prefix}q[{k}]" in columns for k in range(12))
+    # Each column counts: a joint whose position alone cannot be read is not to get lost.
+    n = sum(any(f"{prefix}{stem}[{k}]" in columns for stem in ("q", "dq", "tau_J")) for k in range(12))
     clocks = [name for name in ("time", "duration", "state.time") if name in columns]
     if not clocks:
         raise LogError(f"{path}: has no column time or duration; libfranka's logToCSV writes one, in ms")

@@ -25,7 +25,9 @@ def read_rtde(path: Path) -> Recording:
     """Read one recording; raises ``LogError`` where it lacks what a log needs."""
     table = read_text(path)
     columns = table.columns
-    n = sum(f"actual_q_{k}" in columns for k in range(12))
+    # Each column counts: a joint whose position alone cannot be read is not to get lost.
+    stems = ("actual_q", "actual_qd", *(stem for stem, _ in _TORQUES))
+    n = sum(any(f"{stem}_{k}" in columns for stem in stems) for k in range(12))
 
     def names(stem: str) -> list[str]:
         return [f"{stem}_{k}" for k in range(n)]
@@ -33,7 +35,8 @@ def read_rtde(path: Path) -> Recording:
     def has(stem: str) -> bool:
         return all(name in columns for name in names(stem))
 
-    measured = [(stem, unit) for stem, unit in _TORQUES if has(stem)]
+    measured = [(stem, unit) for stem, unit in _TORQUES if not columns.keys().isdisjoint(names(stem))]
+    measured.sort(key=lambda each: not has(each[0]))
     if not measured:
         raise LogError(
             f"{path}: has no column actual_current_0: neither currents nor torques were recorded; "
