@@ -106,3 +106,23 @@ def test_dates_and_times_of_day_are_a_clock(tmp_path, log, rows, form, begin):
     found = convert([path], answers=ASKED)
     assert_same(found.log, log)
     np.testing.assert_allclose(found.log.time, log.time, atol=1e-6)
+
+
+@pytest.mark.parametrize("stem", ["header.stamp.", "stamp_", ""])
+@pytest.mark.parametrize("ends", [("sec", "nanosec"), ("secs", "nsecs")])
+def test_stamps_in_two_columns_are_one_clock(tmp_path, log, rows, stem, ends):
+    ns = [1_700_000_000_950_000_000 + round(1e9 * at) for at in log.time]
+    stamped = [[str(at // 10**9), str(at % 10**9), *row[1:]] for at, row in zip(ns, rows, strict=True)]
+    names = [*(stem + end for end in ends), *NAMES[1:]]
+    found = convert([write(tmp_path / "log.csv", stamped, names)], answers=ASKED)
+    assert_same(found.log, log)
+    np.testing.assert_allclose(found.log.time, log.time, atol=1e-9)
+
+
+@pytest.mark.parametrize("beside", [["sec", "nanosec"], ["date"]])
+def test_a_motion_log_with_another_clock_beside_it_stays_one(tmp_path, log, rows, beside):
+    cells = ["5", "0"] if len(beside) == 2 else ["2024-03-12 12:00:00"]
+    path = write(tmp_path / "log.csv", [[*row, *cells] for row in rows], [*NAMES, *beside])
+    found = convert([path])
+    assert found.kinds == ["motion log"]
+    assert_same(found.log, log)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from armloop.convert.recording import Array
 # A date in whatever order, or none, and a time of day: 31.03.2024 23:59:58,25, 3/31/2024 11:59:58 PM, 23:59:58.250.
 _TIME_OF_DAY = re.compile(r"(?:([\d./-]+)[T ] ?)?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?) ?([AaPp]\.?[Mm]\.?)?")
 _DAY = 86400.0
+# A stamp in two columns, as ROS has it: header.stamp.sec and header.stamp.nanosec.
+_SECONDS, _REST = re.compile(r"(.*?)[._/]?secs?$"), r"[._/]?n(?:ano)?secs?"
 
 
 def clock_seconds(cells: Any) -> Array | None:
@@ -31,6 +33,24 @@ def clock_seconds(cells: Any) -> Array | None:
     ticks = cells.cast(width).to_numpy()
     seconds = np.asarray((ticks - ticks[0]) / per_second, dtype=np.float64)
     return _past_midnight(seconds) if pyarrow.types.is_time(kind) else seconds
+
+
+def stamps_of(columns: Mapping[str, Array]) -> dict[str, tuple[str, str, Array]]:
+    """Stamps in columns of seconds and of nanoseconds: by their common name both, and (N,) seconds from the first row."""
+    found = {}
+    for name, seconds in columns.items():
+        stem = _SECONDS.fullmatch(name)
+        rest = (
+            [] if stem is None else [one for one in columns if re.fullmatch(re.escape(stem[1]) + _REST, one)]
+        )
+        if stem is None or len(rest) != 1:
+            continue
+        nanoseconds = columns[rest[0]]
+        whole = bool((seconds == np.round(seconds)).all())
+        if whole and bool(((nanoseconds >= 0) & (nanoseconds < 1e9)).all()):
+            stamp = seconds - seconds[0] + 1e-9 * (nanoseconds - nanoseconds[0])
+            found[stem[1] or "stamp"] = name, rest[0], stamp
+    return found
 
 
 def _of_texts(texts: Sequence[str]) -> Array | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armloop.convert.clocks import clock_seconds
+from armloop.convert.clocks import clock_seconds, stamps_of
 from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
@@ -19,8 +19,13 @@ def read_table(path: Path) -> Recording:
     """Read one table; raises ``LogError`` where it cannot be read."""
     table = _parquet(path) if kind_of(path) == PARQUET else read_text(path)
     columns, units, said = table.columns, table.units, [*table.notes, *table.left_out()]
-    kind, mapping, unsure = "motion log", None if units else _own(columns, told_unit(path) or "N*m"), {}
-    if mapping is None:
+    for stamp, (whole, rest, seconds) in stamps_of(columns).items():
+        if stamp not in columns:
+            del columns[whole], columns[rest]
+            columns[stamp], units[stamp] = seconds, "s"
+            said.append(f"{stamp}: {whole} and {rest}, counted in s from the first row")
+    kind, mapping, unsure = "motion log", _own(columns, told_unit(path) or "N*m"), {}
+    if mapping is None or mapping.used() & units.keys():
         found = suggest(list(columns), units=units)
         kind, mapping, unsure = "table", found.mapping, found.unsure
     for name in table.twice:  # without a map it is not known yet what is needed
