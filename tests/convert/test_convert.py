@@ -466,3 +466,19 @@ def test_a_joint_whose_position_cannot_be_read_is_not_lost(tmp_path, log, capsys
         line = refused(["convert", str(path), "--out", str(tmp_path / "out.csv")], capsys)
         assert f"no column {name}, which q of joint 3 needs" in line
         assert (f"{name} (no numbers: '---')" in line) == bool(cell)
+
+
+def test_sources_that_name_other_joints_or_units_are_not_put_below_each_other(tmp_path, log, capsys):
+    names, turned = ["waist", "shoulder", "elbow"], ["shoulder", "waist", "elbow"]
+    first = bag(tmp_path / "first", log, [0, 1, 2], kind="mcap", names=names)
+    other = bag(tmp_path / "other", log, [0, 1, 2], kind="mcap", names=turned)
+    line = ["convert", str(first), str(other), "--tau-unit", "N*m", "--out", str(tmp_path / "out.csv")]
+    said = refused(line, capsys)
+    assert (
+        f"{other}: its joints are {', '.join(turned)}, those of {first} {', '.join(names)}; give --arm"
+        in said
+    )
+    torques, currents = table(tmp_path / "torques.csv", log), tmp_path / "currents.parquet"
+    assert main(["convert", str(torques), "--tau-unit", "A", "--out", str(currents)]) == 0
+    said = refused(["convert", str(torques), str(currents), "--out", str(tmp_path / "out.csv")], capsys)
+    assert f"{currents}: tau is in A, that of {torques} in N*m" in said

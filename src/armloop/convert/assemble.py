@@ -102,8 +102,6 @@ def joined(parts: Sequence[Part]) -> tuple[MotionLog, dict[str, Array]]:
     """
     clocks: list[Array] = []
     logs = [one.log for one in parts]
-    if len({log.tau_unit for log in logs}) > 1:
-        raise LogError("the sources hold torques and currents; say --drive-gains, or convert them one by one")
     first = parts[0].epoch
     for one in parts:
         time = _spread(one.log.time, one.starts)

@@ -73,10 +73,8 @@ def convert(
             first = next(iter(f"{field}: {text}" for field, text in recording.unsure.items()))
             recording.notes.append(f"columns recognised by their names ({first})")
         parts.append(part(recording, chosen, arm, answers or Answers()))
-    if len({one.log.joints for one in parts}) > 1:
-        raise LogError(
-            f"{paths[-1]}: has {parts[-1].log.joints} joints, {paths[0]} {parts[0].log.joints}; give logs of one arm"
-        )
+    for path, one in zip(paths[1:], parts[1:], strict=True):
+        _require_like(path, one, paths[0], parts[0], arm)
     for k, one in enumerate(parts):
         for j, other in enumerate(parts[:k]):
             if same_measurement(one.log, other.log):
@@ -89,3 +87,21 @@ def convert(
         notes += [head + note for note in one.notes]
     extra = {name: cells for name, cells in extra.items() if not np.isnan(cells).all()}
     return Converted(log, extra, parts[0].joints, [r.kind for r in recordings], notes)
+
+
+def _require_like(path: str | Path, one: Part, first_path: str | Path, first: Part, arm: Arm | None) -> None:
+    """Raise ``LogError`` unless a source goes below the first: the same joints in the same order, tau in one unit."""
+    if one.log.joints != first.log.joints:
+        raise LogError(
+            f"{path}: has {one.log.joints} joints, {first_path} {first.log.joints}; give logs of one arm"
+        )
+    if arm is None and one.joints != first.joints:
+        raise LogError(
+            f"{path}: its joints are {', '.join(one.joints)}, those of {first_path} {', '.join(first.joints)}; give --arm, "
+            "with whose joints both are matched"
+        )
+    if one.log.tau_unit != first.log.tau_unit:
+        raise LogError(
+            f"{path}: tau is in {one.log.tau_unit}, that of {first_path} in {first.log.tau_unit}; say --drive-gains, or "
+            "convert them one by one"
+        )
