@@ -126,3 +126,9 @@ def test_a_motion_log_with_another_clock_beside_it_stays_one(tmp_path, log, rows
     found = convert([path])
     assert found.kinds == ["motion log"]
     assert_same(found.log, log)
+
+
+def test_rows_of_empty_cells_are_blank_lines(tmp_path, log, rows):
+    empty, quoted = [""] * 10, ['""'] * 10
+    path = write(tmp_path / "log.csv", [empty, *rows[:300], quoted, *rows[300:], empty, empty])
+    assert_same(convert([path]).log, log)

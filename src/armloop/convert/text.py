@@ -89,7 +89,7 @@ def read_text(path: Path) -> TextTable:
                     f"{path}: line {k + 1} is a header with other columns than line {first + 1}; split the file there"
                 )
             remarks.append(k)
-        elif lines[k].strip():
+        elif lines[k].strip(f' \t"{separator}'):  # a spreadsheet writes rows of empty cells
             body.append(lines[k])
             numbers.append(k + 1)
     if remarks:
