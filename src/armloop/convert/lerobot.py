@@ -7,6 +7,7 @@ the data set says neither, so both are asked for.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -72,13 +73,8 @@ def read_lerobot(path: Path) -> Recording:
             columns |= {f"{name}/{entry}": values[:, k] for k, entry in enumerate(entries)}
         else:
             columns |= flatten({name: values})
-    mapping = _mapping(columns, _rate(info, path))
-    unsure = {}
-    if mapping is None:
-        unsure["columns"] = (
-            f"no torques or currents among {', '.join(sorted(arrays))}; a log needs them (observation.effort, or a state "
-            "with …effort or …current)"
-        )
+    found = _mapping(columns, _rate(info, path))
+    mapping, unsure = (None, {"columns": found}) if isinstance(found, str) else (found, {})
     episode = arrays.get("episode_index")
     starts = [0] if episode is None else [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(episode)))]
     notes = [f"{len(starts)} episode{'s' * (len(starts) != 1)}"]
@@ -105,17 +101,33 @@ def _rate(info: dict[str, Any], path: Path) -> float | None:
     return float(fps)
 
 
-def _mapping(columns: dict[str, Array], fps: float | None) -> Mapping | None:
+def _mapping(columns: dict[str, Array], fps: float | None) -> Mapping | str:
+    """The map that names give, or why they give none."""
     time = TimeMap("timestamp", "s") if "timestamp" in columns else TimeMap(rate=fps)
     states = [name for name in columns if name.startswith("observation.state")]
     by_ending = {kind: [n for n in states if _ending(n) in endings] for kind, endings in _ENDINGS.items()}
     torques = next((found for stem in _TORQUES if (found := _of(columns, stem))), by_ending["tau"])
     velocities = next((found for stem in _VELOCITIES if (found := _of(columns, stem))), by_ending["v"])
     positions = by_ending["q"] or [name for name in states if name not in (*torques, *velocities)]
+    held = {_stem(name) for name in positions}
+    if (
+        strange := [name for name in torques if _stem(name) not in held]
+        if held & {*map(_stem, torques)}
+        else []
+    ):
+        return (
+            f"{', '.join(strange)} belong to no position by name, as the others do ({', '.join(positions)})"
+        )
     positions, torques, velocities = _paired(positions, torques, velocities)
     if not positions or len(torques) != len(positions):
         guess = suggest(list(columns)).mapping
-        return None if guess is None or guess.time.column is None else guess
+        if guess is not None and guess.time.column is not None:
+            return guess
+        arrays = sorted({re.split(r"[/\[]", name)[0] for name in columns})
+        return (
+            f"no torques or currents among {', '.join(arrays)}; a log needs them (observation.effort, or a state "
+            "with …effort or …current)"
+        )
     v = QuantityMap(velocities) if len(velocities) == len(positions) else None
     joints = [_joint(name) for name in positions] if "/" in positions[0] else None
     return Mapping(time, QuantityMap(positions), QuantityMap(torques), v, joints=joints)
@@ -130,9 +142,8 @@ def _paired(q: list[str], tau: list[str], v: list[str]) -> tuple[list[str], list
     common = [joint for joint in by_joint[0] if joint in by_joint[1]]
     if not common:
         return q, tau, v
-    known = all(joint in by_joint[2] for joint in common)
-    found = [[names[joint] for joint in common] for names in by_joint[:2]]
-    return found[0], found[1], [by_joint[2][joint] for joint in common] if known else v
+    found = [[names[joint] for joint in common if joint in names] for names in by_joint]
+    return found[0], found[1], found[2] or v
 
 
 def _of(columns: dict[str, Array], stem: str) -> list[str]:
@@ -180,12 +191,20 @@ def _names(value: Any) -> list[str]:
 
 def _array(column: Any) -> Any:
     import pyarrow
+    import pyarrow.compute
 
     kind = column.type
     if isinstance(kind, pyarrow.ListType | pyarrow.LargeListType | pyarrow.FixedSizeListType):
         if not is_number(kind.value_type):
             return None
         rows = column.combine_chunks()
-        flat = np.asarray(rows.flatten().to_numpy(zero_copy_only=False), dtype=np.float64)
-        return flat.reshape(len(rows), -1) if len(rows) and len(flat) % len(rows) == 0 else None
+        lengths = np.asarray(
+            pyarrow.compute.list_value_length(rows).fill_null(0).to_numpy(zero_copy_only=False)
+        )
+        width = int(np.median(lengths)) if len(lengths) else 0
+        # a row that is missing, or has too few or too many entries, is no numbers: it is named where it is needed
+        whole = lengths == width
+        made = np.full((len(rows), width), np.nan)
+        made[whole] = rows.filter(whole).flatten().to_numpy(zero_copy_only=False).reshape(-1, width or 1)
+        return made if width else None
     return column.to_numpy().astype(np.float64) if is_number(kind) else None
