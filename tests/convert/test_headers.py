@@ -8,6 +8,7 @@ from armloop.cli import main
 from armloop.convert import Answers, convert
 from armloop.convert.headers import suggest
 from armloop.data.log import MotionLog, read_log
+from armloop.util.errors import InputError
 
 DEGREE = np.pi / 180
 
@@ -92,3 +93,20 @@ def test_one_quantity_in_two_columns_is_no_arm_of_more_joints(names):
     assert len(found.mapping.q.names()) == 2
     assert found.mapping.q.unit in (None, "rad", "deg")
     assert "q" in found.unsure
+
+
+@pytest.mark.parametrize("stem", ["torque_cmd_{}", "tau_ext{}", "tau_d{}", "torque_limit{}"])
+def test_what_was_asked_for_is_not_taken_for_what_was_measured(tmp_path, log, capsys, stem):
+    names = [each.format(j) for each in ("q{} [rad]", "v{} [rad/s]", stem) for j in (1, 2, 3)]
+    path = write(tmp_path / "log.csv", ["time [s]", *names], log, per_unit=np.ones(3))
+    with pytest.raises(InputError, match="is not what was measured by its name"):
+        convert([path], answers=Answers(tau_unit="N*m"))
+    assert main(["convert", str(path), "--suggest", "--map", str(tmp_path / "map.yaml")]) == 0
+    assert "tau:  # unsure: " in (tmp_path / "map.yaml").read_text()
+    assert "is not what was measured by its name" in capsys.readouterr().out
+
+
+def test_a_motors_current_is_measured(tmp_path, log):
+    names = [each.format(j) for each in ("q{} [rad]", "v{} [rad/s]", "motor_current{}") for j in (1, 2, 3)]
+    path = write(tmp_path / "log.csv", ["time [s]", *names], log, per_unit=np.ones(3))
+    assert_same(convert([path], answers=Answers(tau_unit="A")).log, log)

@@ -70,6 +70,11 @@ def suggest(
                 return Suggestion(None, {"columns": f"no {len(q.columns)} columns of torque go with {q.key}"})
             continue
         group = fitting[0]
+        if (doubt := not_measured(group)) is not None:
+            if kind in needed:
+                return Suggestion(None, {"columns": doubt})
+            unsure[kind] = doubt
+            continue
         fields[kind] = QuantityMap(list(group.columns), unit_of(kind, group.units))
         if len(fitting) > 1:
             unsure[kind] = "also possible: " + ", ".join(other.key for other in fitting[1:4])
@@ -86,7 +91,7 @@ def suggest(
         list(q.joints) if named else None,
     )
     if "v" not in fields:
-        unsure["v"] = "no velocities were recognised; they will be differenced from q"
+        unsure.setdefault("v", "no velocities were recognised; they will be differenced from q")
     if not named:
         unsure["joints"] = "the columns are taken base to tip"
     return Suggestion(mapping, unsure)
@@ -236,6 +241,16 @@ def ranked(kind: str, groups: Sequence[Group]) -> list[Group]:
     return sorted(
         (group for group in groups if kind_of(group.words) == kind and rank(group)[0] < 2), key=rank
     )
+
+
+def not_measured(group: Group) -> str | None:
+    """What to say of columns that by their names are what was asked for, or a bound; a motor's are measured."""
+    # a letter is one only at the end: q_d, not drive d
+    said = [
+        word for word in group.words if word in WANTED - {"motor"} and (len(word) > 1 or not word.isascii())
+    ]
+    said = said or [word for word in group.words[-1:] if word in WANTED - {"motor"}]
+    return f"{group.key} is not what was measured by its name ({said[0]})" if said else None
 
 
 def unit_of(kind: str, said: Sequence[str]) -> str | list[str] | None:

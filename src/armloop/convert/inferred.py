@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from armloop.convert.evidence import Evidence, evidence
-from armloop.convert.headers import Group, groups_of, ranked, split_unit, time_of, unit_of
+from armloop.convert.headers import Group, groups_of, not_measured, ranked, split_unit, time_of, unit_of
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Recording, some
 from armloop.convert.units import canonical
@@ -41,6 +41,9 @@ def inferred(recording: Recording, joints: Sequence[str]) -> tuple[Mapping, dict
         kind: QuantityMap(names or [UNSAID], _unit(kind, named[kind], names, recording))
         for kind, names in (("q", q), ("tau", tau), ("v", v))
     }
+    for kind, group in named.items():
+        if group is not None and fields[kind].names() == _members(group) and (said := not_measured(group)):
+            unsure[kind] = said
     if not v:
         unsure["v"] = "no velocities were recognised; they will be differenced from q"
     unsure.setdefault("joints", "the columns are taken base to tip")
