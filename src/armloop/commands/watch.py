@@ -45,7 +45,8 @@ class Watch(Json):
         type=_hours,
     )
     healthy: int = option(
-        "the first N logs of an arm are known to be healthy: how warmth matters is learned there (default: %(default)s)",
+        "the first N units of an arm (a log, or ten minutes of a long one) are known to be healthy: how warmth matters is "
+        "learned there (default: %(default)s)",
         20,
         metavar="N",
         type=whole(1, 10**9, "no number of them; give a whole number from 1"),

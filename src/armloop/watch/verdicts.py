@@ -46,7 +46,7 @@ class Options:
 
     Attributes:
         hours: mean time between false alarms of one whole arm that is promised, h of its operation.
-        healthy: first logs of an arm in which it is known to be healthy.
+        healthy: first units of an arm, logs or parts of long ones, in which it is known to be healthy.
         full: whether an alarm's window is diagnosed from its logs, too, where they are still there.
         scheduler: address of a Dask scheduler, or None.
         jobs: processes of this machine; 1 does all in this one.
