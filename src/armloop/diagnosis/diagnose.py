@@ -318,9 +318,8 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     doubted: list[str] = []
     while True:
         fitted = beside = outcome
-        if (
-            bare is not evidence
-        ):  # parameters are those beside the law; what the effects leave without it is left
+        if bare is not evidence:
+            # parameters are those beside the law; what the effects leave without it is left
             beside = refitted(bare, outcome)
             fitted = replace(outcome, after=replace(beside.after, outside=outcome.after.outside))
         augmented = model.with_effects([*fitted.added(), *(contact.added for contact in contacts)])

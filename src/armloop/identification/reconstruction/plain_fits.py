@@ -37,6 +37,8 @@ _EVERY = 3
 _EXACT = 1e-9
 #: What explains a joint, in its place or unit, leaves a relative error below this; a gain is far off from this factor on.
 GOOD, FAR = 0.6, 3.0
+#: Readings of a record that explain nearly this part as much as the best are as good, and the simplest is meant.
+AS_GOOD = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +49,9 @@ class Fit:
     power: Array
     inertia: Array
 
-    def over(self, other: Fit, joints: Sequence[int] | None = None) -> float:
-        """Relative errors of joints, all by default, over the other's, in the geometric mean."""
-        mine, others = (np.maximum(fit.relative, _EXACT) for fit in (self, other))
+    def over(self, other: Fit, joints: Sequence[int] | None = None, least: float = _EXACT) -> float:
+        """Relative errors of joints, all by default, over the other's, each at least so large, in the geometric mean."""
+        mine, others = (np.maximum(fit.relative, least) for fit in (self, other))
         ratio = np.log(mine / others)
         return float(np.exp(np.mean(ratio if joints is None else ratio[list(joints)])))
 
@@ -122,10 +124,28 @@ class PlainFits:
 
     def sprung(self) -> Self:
         """The same with a spring at every joint."""
-        q = self.table.motion.q[:, :, None] * np.eye(self.arm.n)
-        return replace(
-            self, table=replace(self.table, columns=np.concatenate([self.table.columns, q], axis=2))
-        )
+        return self.beside(self.table.motion.q[:, :, None] * np.eye(self.arm.n))
+
+    def waved(self) -> Self:
+        """The same with a spring at every joint and the sine and cosine of its angle."""
+        q = self.table.motion.q
+        own = [x[:, :, None] * np.eye(self.arm.n) for x in (q, np.sin(q), np.cos(q))]
+        return self.beside(np.concatenate(own, axis=2))
+
+    def beside(self, columns: Array) -> Self:
+        """The same with more columns (N, n, p), after the others."""
+        both = np.concatenate([self.table.columns, columns], axis=2)
+        return replace(self, table=replace(self.table, columns=both))
+
+    def solved(self, tau: Array, rows: Mask) -> tuple[Array, Array]:
+        """Coefficients (p,) of torques (N, n) at these rows (N, n), and what they leave of each joint (n,), RMS."""
+        table = self.table
+        error = table.sizes(tau, rows)
+        for _ in range(2):  # joints weigh by their torques first, then by what is left of them
+            X, y, _ = table.weighed(tau, rows, error)
+            theta = determined_solution(X, y)
+            error = table.sizes(tau - table.columns @ theta, rows)
+        return theta, error
 
     def fit(self, signs: Array, order: Index, half: int | None = None) -> Fit:
         """Regress the torques with these signs in this order, of all blocks or of every other one."""
@@ -133,11 +153,7 @@ class PlainFits:
         tau = signs * table.tau[:, order]
         rows = table.moving if half is None else table.moving & (table.blocks % 2 == half)[:, None]
         scale = table.sizes(tau, rows)
-        size = scale
-        for _ in range(2):  # joints weigh by their torques first, then by what is left of them
-            X, y, _ = table.weighed(tau, rows, size)
-            theta = determined_solution(X, y)
-            size = error = table.sizes(tau - table.columns @ theta, rows)
+        theta, error = self.solved(tau, rows)
         power = np.zeros(n)
         for j, own in enumerate(rows.T):
             columns = table.columns[own, j, r + 3 * j : r + 3 * j + 2]

@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from armloop.data.log import MotionLog, unchecked_log
-from armloop.identification.reconstruction.mounting import better_mounting
-from armloop.identification.reconstruction.plain_fits import GOOD, Fit, PlainFits
+from armloop.identification.reconstruction.mounting import Mounting, other_mounting
+from armloop.identification.reconstruction.plain_fits import AS_GOOD, GOOD, Fit, PlainFits
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Index
 
-#: Mean relative error below which a record is taken as it stands.
+#: Mean relative error below which a record is taken as it stands; of a joint that is met so well, better says nothing.
 _GOOD_ENOUGH = 0.02
 #: Another order must lower the relative error by this factor (geometric mean of all joints), another unit by this one,
 #: every joint's to a good one: orders are many, and springs as strong as all the rest on all joints made one of them twice
@@ -36,8 +36,6 @@ _SENSE = (2.0, 1.2, 0.8)
 _SCREENED, _PROMISING = 3, 1.1
 #: Arms of so many joints are tried with every set of them counting the other way; larger ones with any one or two.
 _EVERY_SENSE = 7
-#: Readings whose gains are as near as this part are as good; the first, of the fewest joints, is meant.
-AS_GOOD = 0.95
 #: Arms of so many joints are tried in every order; larger ones with any two in exchange, turned round and moved on by one.
 _EVERY_ORDER = 4
 #: Units of an angle that are not the radian, in rad.
@@ -91,9 +89,9 @@ class Reading(NamedTuple):
         if other.faults.sum() > plain.faults.sum() or other.relative.max() >= GOOD:
             return False
         if self.turned or self.down:
-            each = [plain.over(other, [j]) for j in range(len(self.order))]
+            each = [plain.over(other, [j], _GOOD_ENOUGH) for j in range(len(self.order))]
             best, mean, worst = _SENSE
-            better = max(each) > best and plain.over(other) > mean and min(each) > worst
+            better = max(each) > best and plain.over(other, least=_GOOD_ENOUGH) > mean and min(each) > worst
             return better and sprung.over(other) > 1
         return plain.over(other) > (_UNIT if self.unit else _ORDER)
 
@@ -151,22 +149,28 @@ def _orders(n: int) -> Iterator[tuple[int, ...]]:
         yield tuple((k + step) % n for k in range(n))
 
 
-def meant(problem: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float, plain: Fit) -> str:
-    """What is wrong with a record that another reading explains far better, the simplest of the best; empty if none does.
+def meant(
+    problem: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float, plain: Fit
+) -> tuple[str, Mounting | None]:
+    """What is wrong with a record that another reading explains far better, the simplest of the best; or how its base leans.
 
     Args:
         problem: what is regressed of the record as it stands.
         plain: what is left of it.
+
+    Returns:
+        Empty words if no reading does; and a base that leans, if that explains most.
     """
     if float(np.mean(plain.relative)) < _GOOD_ENOUGH:
-        return ""
+        return "", None
     n = len(plain.relative)
     found: list[tuple[Reading, float]] = []
     few = problem.every(_SCREENED)
     first = few.fit(np.ones(n), np.arange(n))
     sprung = problem.sprung().fit(np.ones(n), np.arange(n))
-    down = better_mounting(problem, plain)
-    mounted = [Reading(np.arange(n), down=down)] if down else []
+    mounting = other_mounting(problem, plain)
+    leans = mounting is not None and mounting.lean is not None
+    mounted = [] if mounting is None else [Reading(np.arange(n), down=tuple(mounting.down.tolist()))]
     for reading in (*mounted, *readings(problem.arm)):
         if reading.turned:
             quick = few.read(reading.order, reading.signs).fit(np.ones(n), np.arange(n))
@@ -176,13 +180,15 @@ def meant(problem: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float, plain
         if read is None:
             continue
         other = read.fit(np.ones(n), np.arange(n))
-        if reading.far_better(plain, other, sprung):
+        if (reading.down and leans) or reading.far_better(plain, other, sprung):
             found.append((reading, plain.over(other)))
     best = max((times for _, times in found), default=0.0)
     near = sorted((pair for pair in found if pair[1] >= AS_GOOD * best), key=lambda pair: len(pair[0].turned))
     if not near:
-        return ""
+        return "", None
     reading, times = near[0]
+    if reading.down and leans:
+        return "", mounting
     # an arm that hangs is its own mirror image, whose joints turn the other way
     others = [f"; or {other.which()} against the URDF's axes" for other, _ in near if other.turned]
-    return reading.words(times) + "".join(others[:1] if reading.down else [])
+    return reading.words(times) + "".join(others[:1] if reading.down else []), None

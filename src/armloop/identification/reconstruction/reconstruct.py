@@ -171,8 +171,15 @@ def reconstruct(
         # samples that are no time series show the first library alone what it needs
         wanted = wanted if conditioning.cutoff_hz > 0 else wanted[:1]
     usual = [one.conditioning for one in wanted]
-    ready = prepared(logs, kept, arm, usual, conditioning, settings, progress, corrected=method != REFERENCE)
-    check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz)
+    preparing = partial(
+        prepared, logs, kept, usual=usual, given=conditioning, options=settings, progress=progress
+    )
+    ready = preparing(arm=arm, corrected=method != REFERENCE)
+    leaning = check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz)
+    if leaning is not None:
+        progress("the base leans: anew under gravity as it is")
+        arm = leaning.of(arm)
+        ready = preparing(arm=arm, corrected=method != REFERENCE)
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
         how = ready.conditioning(library.conditioning)
@@ -186,6 +193,9 @@ def reconstruct(
         found = library.methods[method](arm, data, ready.options, progress)
         found.history |= ready.history()
         found.notes += ready.notes(arm, how)
+        if leaning is not None:
+            found.history["leaning"] = leaning.to_dict()
+            found.notes.append(leaning.note())
         return Attempt(library, how, data, found, ready.blocks.margin)
 
     refused = {} if library is not None else _refused(arm, wanted, ready)

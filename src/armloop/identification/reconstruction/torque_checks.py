@@ -19,6 +19,7 @@ import numpy as np
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
 from armloop.identification.reconstruction.bandwidth import determined_solution
+from armloop.identification.reconstruction.mounting import Mounting
 from armloop.identification.reconstruction.plain_fits import FAR, GOOD, Fit, PlainFits
 from armloop.identification.reconstruction.readings import meant
 from armloop.identification.reconstruction.systematic_sample import even_selection
@@ -33,14 +34,14 @@ _BETTER = 2.0
 _ALIKE = 1.5
 
 
-def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> None:
-    """Raise `LogError`, with the likely cause, where the torques cannot be those of this arm in this motion."""
+def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> Mounting | None:
+    """How the base leans, if it does; raises `LogError`, with the likely cause, of torques that cannot be this arm's."""
     chosen = even_selection(logs)
     if cutoff_hz <= 0 or not all(is_time_series(log.q, log.runs()) for log in chosen):
-        return
+        return None
     problem = Problem.of(chosen, arm, cutoff_hz)
     if problem is None:
-        return
+        return None
     named = list(dict.fromkeys(log.name for log in chosen))
     names = ", ".join(named[:3]) + (", ..." if len(named) > 3 else "")
     plain = problem.fit(np.ones(arm.n), np.arange(arm.n))
@@ -61,8 +62,10 @@ def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> None
             f"{names}: the torques do not fit one another: tau{j + 1} is about {float(f'{1 / factor:.2g}'):g} times what "
             "the links give that explain the other joints; check the units and drive gains of all joints"
         )
-    if wrong := meant(problem, chosen, cutoff_hz, plain):
+    wrong, leaning = meant(problem, chosen, cutoff_hz, plain)
+    if wrong:
         raise LogError(f"{names}: {wrong}")
+    return leaning
 
 
 class Problem(PlainFits):

@@ -14,8 +14,8 @@ import numpy as np
 
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
-from armloop.identification.reconstruction.plain_fits import FAR
-from armloop.identification.reconstruction.readings import AS_GOOD, Reading, readings
+from armloop.identification.reconstruction.plain_fits import AS_GOOD, FAR
+from armloop.identification.reconstruction.readings import Reading, readings
 from armloop.identification.scoring import residual, score_errors
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
