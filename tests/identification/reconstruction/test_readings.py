@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from leaning_arm import upright_axes
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog, read_log, unchecked_log
-from armloop.data.motion import Motion
 from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
 from armloop.identification.reconstruction.readings import Reading, meant, readings
 from armloop.identification.reconstruction.torque_checks import check_torques
@@ -32,8 +32,9 @@ def misread(log: MotionLog, order: list[int], factor: float = 1.0) -> MotionLog:
 
 
 def arm_of(kinds: str) -> Any:
-    """An arm that is known by the kinds of its joints, R or P."""
-    return SimpleNamespace(n=len(kinds), revolute=np.array([kind == "R" for kind in kinds]))
+    """A weightless arm that is known by the kinds of its joints, R or P."""
+    revolute = np.array([kind == "R" for kind in kinds])
+    return SimpleNamespace(n=len(kinds), revolute=revolute, gravity=np.zeros(3))
 
 
 def orders(kinds: str) -> list[list[int]]:
@@ -102,32 +103,6 @@ def test_the_direction_of_gravity_is_found(seed: int, down: tuple[float, float, 
         check_torques([log], three_axis(), 10.0)
     found = np.array([float(x) for x in str(said.value).split("along (")[1].split(")")[0].split(", ")])
     np.testing.assert_allclose(found, np.array(down) / np.linalg.norm(down), atol=0.03)
-
-
-def upright_axes(seed: int, lean: float, slower: float = 1.0, rubbing: float = 1.0) -> MotionLog:
-    """A SCARA's record, so many times as slow, whose base leans by an angle in rad about y."""
-    arm = load_arm("scara")
-    parts = [fourier_motion(40.0 / slower, 100.0 * slower, seed + more) for more in (0, 50)]
-    q, v, vdot = (np.hstack([getattr(part, name) for part in parts])[:, :4] for name in ("q", "v", "vdot"))
-    size = np.where(arm.revolute, 1.0, 0.05)
-    rates = [x * size / slower**order for order, x in enumerate((q, v, vdot))]
-    motion = Motion(slower * parts[0].time, *rates, np.array([0]))
-    leaning = replace(arm, gravity=9.81 * np.array([np.sin(lean), 0.0, -np.cos(lean)]))
-    tau = rigid_torque(leaning, motion.q, motion.v, motion.vdot)
-    return measured(motion, tau + rubbing * (0.3 * np.sign(motion.v) + 0.2 * motion.v), seed)
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize(("slower", "rubbing"), [(1.0, 3.0), (1.0, 0.1), (4.0, 1.0)])
-def test_upright_axes_that_lean_are_left_to_the_law_that_says_how_far(
-    seed: int, slower: float, rubbing: float
-) -> None:
-    """A level base spares them gravity: the slightest lean is seen, and any other direction explains it nearly as well."""
-    for lean in (0.03, 0.1, 0.3):
-        check_torques([upright_axes(seed, lean, slower, rubbing)], load_arm("scara"), 10.0)
-    if slower == 1.0:
-        with pytest.raises(LogError, match="the arm seems to be mounted otherwise"):
-            check_torques([upright_axes(seed, 1.2, slower, rubbing)], load_arm("scara"), 10.0)
 
 
 def test_a_joint_that_is_explained_well_says_nothing_of_another_that_is_not() -> None:
@@ -263,7 +238,7 @@ def chosen(plain: Fit, others: dict[str, Fit], monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(PlainFits, "of", given.of)
     q = np.zeros((3, len(plain.relative)))
     log = unchecked_log(time=np.arange(3.0), q=q, v=q, tau=q, name="run")
-    return meant(given, [log], 10.0, plain)
+    return meant(given, [log], 10.0, plain)[0]
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from armloop.identification.reconstruction.bandwidth import RIDGE, TINY
 from armloop.identification.reconstruction.plain_fits import PlainFits
+from armloop.identification.reconstruction.projected import block_covariance
 from armloop.robot.newton_euler import joint_torques
 from armloop.util.arrays import Array
 
@@ -80,9 +81,7 @@ def _step(problem: PlainFits, down: Array) -> tuple[Array, Direction]:
     inverse = np.linalg.inv(X.T @ X + RIDGE * np.eye(X.shape[1]))
     found = inverse @ (X.T @ y)
     blocks = np.concatenate([table.blocks[own] for own in rows.T])
-    scores = np.zeros((int(blocks.max()) + 1, X.shape[1]))
-    np.add.at(scores, blocks, X * (y - X @ found)[:, None])
-    covariance = inverse @ (scores.T @ scores) @ inverse / np.outer(lengths, lengths)
+    covariance = block_covariance(inverse, X * (y - X @ found)[:, None], blocks) / np.outer(lengths, lengths)
     return (found / lengths)[-2:] @ across, Direction(down, across, covariance[-2:, -2:])
 
 

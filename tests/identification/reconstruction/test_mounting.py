@@ -1,0 +1,115 @@
+"""A base that leans is found by the torques, and the model takes gravity as it is."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from leaning_arm import three_axes, turned_by, upright_axes
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+
+from armloop.data.log import read_log
+from armloop.data.signals import preprocess
+from armloop.identification.reconstruction import reconstruct
+from armloop.identification.reconstruction.gravity_direction import Direction
+from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.identification.scoring import score
+from armloop.model import load_model
+from armloop.robot.arm import load_arm
+from armloop.util.errors import LogError
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("degrees", "axis", "dry"), [(3.0, (1, 0, 0), 0.1), (8.0, (0, 1, 0), 1.0), (15.0, (1, -1, 0), 1.0)]
+)
+def test_a_lean_is_found_within_its_errors(
+    seed: int, degrees: float, axis: tuple[float, float, float], dry: float
+) -> None:
+    leaning = turned_by(three_axis(), degrees, axis)
+    found = check_torques([three_axes(seed, leaning, dry)], three_axis(), 10.0)
+    assert found is not None and found.lean is not None
+    assert found.lean.beside(leaning.gravity / np.linalg.norm(leaning.gravity)) < 5 * found.lean.std_error
+    assert found.angle == pytest.approx(np.radians(degrees), abs=5 * found.lean.std_error)
+    assert found.lean.std_error < np.radians(0.3)
+    np.testing.assert_allclose(found.of(three_axis()).gravity, leaning.gravity, atol=0.15)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_level_base_does_not_lean_whatever_else_acts(seed: int) -> None:
+    """Springs and waves at the first joint or between joints, a gain, an encoder's zero: they look like it a little."""
+    arm = three_axis()
+    motion = fourier_motion(40.0, 100.0, seed)
+    q, v = motion.q, motion.v
+    tau = rigid_torque(arm, q, v, motion.vdot) + 0.3 * friction(v)
+    size = np.sqrt(np.mean(tau**2, axis=0))
+    first, second = np.eye(3)[0], np.eye(3)[1]
+    elsewhere = rigid_torque(arm, q + 0.05 * second, v, motion.vdot) - rigid_torque(arm, q, v, motion.vdot)
+    for law in (
+        0 * q,
+        np.outer(0.2 * q[:, 0], size * first),
+        np.outer(0.2 * np.sin(q[:, 0] + 0.7), size * first),
+        np.outer(0.05 * np.sin(q[:, 0] - q[:, 1]), size * first),
+        np.outer(0.2 * q[:, 0] * q[:, 1], size * first),
+        0.15 * tau * first,
+        0.15 * tau * second,
+        elsewhere,
+    ):
+        assert check_torques([measured(motion, tau + law, seed)], arm, 10.0) is None
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("slower", "rubbing"), [(1.0, 3.0), (1.0, 0.1), (4.0, 1.0)])
+def test_the_slightest_lean_of_upright_axes_is_seen(seed: int, slower: float, rubbing: float) -> None:
+    """A level base spares them gravity: the torques have no slope there, and any other direction explains nearly as much."""
+    for lean in (0.03, 0.3) if seed == 1 else (0.1,):
+        log = upright_axes(seed, lean, slower, rubbing)
+        found = check_torques([log], load_arm("scara"), 10.0)
+        if (
+            slower == 1.0
+        ):  # slow motion does not tell how far, for the torque is that of a moment times a sine
+            assert found is not None and found.angle == pytest.approx(lean, rel=0.15)
+    if slower == seed == 1:
+        with pytest.raises(LogError, match="the arm seems to be mounted otherwise"):
+            check_torques([upright_axes(seed, 1.2, slower, rubbing)], load_arm("scara"), 10.0)
+
+
+@pytest.mark.measured
+def test_measured_arms_stand_level_and_lean_where_their_urdf_does(measured: Path) -> None:
+    for folder, path, least in (
+        ("panda", "exciting_1a", 1.0),
+        ("ur10e", "noload_20_02_10-20sec_7harm", 10.0),
+    ):
+        arm = load_arm(measured / folder / f"{folder}.urdf")
+        log = read_log(measured / folder / f"{path}.csv", quiet=True)
+        assert check_torques([log], arm, 8.0) is None
+        for degrees in (least, 10.0):
+            found = check_torques([log], turned_by(arm, degrees, (0.6, 0.8, 0.0)), 8.0)
+            # they are not quite level themselves
+            assert found is not None and np.degrees(found.angle) == pytest.approx(degrees, abs=1.5)
+
+
+@pytest.mark.parametrize("library", ["rigid-body", "lagrangian"])
+def test_a_model_of_an_arm_that_leans_has_gravity_as_it_is(library: str, tmp_path: Path) -> None:
+    leaning = turned_by(three_axis(), 6.0, (0, 1, 0))
+    logs = [three_axes(seed, leaning, 0.3, 60.0) for seed in (1, 2)]
+    found = reconstruct(logs, three_axis(), library=library)
+    (said,) = [note for note in found.notes if "the base leans by" in note]
+    assert "gravity acts along (0.1" in said or "gravity acts along (-0.1" in said
+    model = found.model
+    model.save(tmp_path / "model.json")
+    kept = load_model(tmp_path / "model.json", three_axis())
+    np.testing.assert_allclose(kept.arm.gravity, leaning.gravity, atol=0.1)
+    assert kept.history["leaning"]["angle"] == pytest.approx(np.radians(6.0), abs=0.01)
+    other = preprocess([three_axes(3, leaning, 0.3)], kept.conditioning)
+    assert max(score(kept, other).moving["nrmse"]) < 0.02
+
+
+def test_angles_of_a_direction_and_their_errors() -> None:
+    down = np.array([0.0, 0.0, -1.0])
+    direction = Direction(down, np.eye(3)[:2], np.diag([0.01, 0.0004]))
+    aside: Any = np.array([np.sin(0.3), 0.0, -np.cos(0.3)])
+    assert direction.beside(aside) == pytest.approx(0.3)
+    assert direction.beside(-down) == pytest.approx(np.pi)
+    assert direction.standardised(aside) == pytest.approx(np.sin(0.3) / 0.1)
+    assert direction.std_error == pytest.approx(0.1)
