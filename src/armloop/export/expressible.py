@@ -22,6 +22,7 @@ from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.robot.levelling import base_rotation, levelled, roll_and_pitch
 from armloop.util.arrays import Array
 from armloop.util.errors import ModelError
 from armloop.util.functions import NUMPY
@@ -125,7 +126,15 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
             stiffness[j] = 0.0
     # under the gravity that they are in: a base that leans shows more of them
     found = _bodies(replace(arm, gravity=gravity), model, links, rotors, missing, notes)
-    return Said(arm, found.links, found.rotors, damping, dry, stiffness, rest, gravity, missing, notes)
+    level = levelled(arm)
+    if level is not arm:
+        roll, pitch = roll_and_pitch(arm.gravity)
+        turned = base_rotation(roll, pitch) @ gravity
+        gravity = level.gravity if np.array_equal(gravity, arm.gravity) else turned
+        notes.append(
+            f'the base leans: in the file it is level, and the first joint turned (rpy="{roll:.4f} {pitch:.4f} 0")'
+        )
+    return Said(level, found.links, found.rotors, damping, dry, stiffness, rest, gravity, missing, notes)
 
 
 def rigid_parameters(model: ReconstructedModel, constants: Array) -> tuple[Array, Array, Array, Array]:

@@ -23,11 +23,13 @@ from armloop.drake.experiments.tracking import (
     track_in_view,
     without_model,
 )
+from armloop.drake.plant.fault_injection import realise
 from armloop.drake.tuning.loop_analysis import SampledArm, posture_model, sampled_margins
 from armloop.drake.view.live import LiveView
 from armloop.identification.goodness import extrapolated
 from armloop.identification.reconstruction import reconstruct
 from armloop.model import ReconstructedModel
+from armloop.robot.levelling import say_other_gravity
 from armloop.util.doubts import warn
 from armloop.util.files import write_figure, write_json
 from armloop.util.finite import finite
@@ -57,7 +59,7 @@ def run_scenario(
     """
     chosen = models_for(scenario, models, progress)
     require_use(scenario, chosen)
-    _say_extrapolation(scenario, chosen)
+    _say_doubts(scenario, chosen)
     progress(f"tracking {scenario.reference.duration:g} s with each controller")
     results = run_tracking(scenario, chosen) if view is None else track_in_view(scenario, chosen, view)
     answer = tracking_answer(scenario, results) | {"not_run": without_model(scenario, chosen)}
@@ -83,12 +85,14 @@ def run_scenario(
     return answer, results
 
 
-def _say_extrapolation(scenario: TrackingScenario, models: Mapping[str, ReconstructedModel]) -> None:
-    """Warn of a reference that leaves, while it is scored, what the models were trained on."""
+def _say_doubts(scenario: TrackingScenario, models: Mapping[str, ReconstructedModel]) -> None:
+    """Warn of a reference that leaves, while it is scored, what the models were trained on; and of bases that lean."""
     start, end = scenario.score
     time = np.arange(start, end, scenario.plant.config.time_step)
     motion = Motion(time, *scenario.reference.evaluate(time))
+    gravity = realise(scenario.plant.arm, scenario.effects).gravity(scenario.plant.arm)
     for name, model in models.items():
+        say_other_gravity(gravity, model.arm, f"{scenario.name}, model {name}")
         for words in extrapolated(scenario.plant.arm, motion, model.history.get("range")):
             warn(f"{scenario.name}, model {name}: {words}; what it feeds forward there is extrapolated")
 

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 from armloop.data.motion import Motion
 from armloop.laws.effects import effect
 from armloop.laws.effects.events import during, interval
-from armloop.laws.effects.gravity_tilt import base_rotation, tilted_gravity
+from armloop.laws.effects.gravity_tilt import tilted_gravity
+from armloop.robot.levelling import base_rotation
 
 N = an_arm().n
 

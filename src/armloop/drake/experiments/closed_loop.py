@@ -18,12 +18,13 @@ from armloop.drake.control.rate_limiter import RateLimiter
 from armloop.drake.control.reference import ReferenceLike, ReferenceSource, as_reference
 from armloop.drake.experiments.scenarios import Plant, built_in, plant_for
 from armloop.drake.given import require_of, require_predicts, require_step
-from armloop.drake.plant.fault_injection import Effects
+from armloop.drake.plant.fault_injection import Effects, realise
 from armloop.drake.plant.nearest_friction import nearest_friction
 from armloop.drake.plant.plant import ArmPlant
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
+from armloop.robot.levelling import say_other_gravity
 from armloop.util.errors import InputError
 
 CONTROLLERS = ("pid", "computed_torque")
@@ -67,6 +68,7 @@ class ControlledArm:
         """
         if isinstance(model, ReconstructedModel):
             model.arm.require_same(self.plant.arm, "the model")
+            say_other_gravity(self.plant.effects.gravity(self.plant.arm), model.arm)
         if isinstance(self.controller, PidController):
             self.reference.set_model(model, step)
         else:
@@ -115,6 +117,7 @@ def add_arm_with_controller(
     _check_controller(controller, gains, model, step)
     if isinstance(model, ReconstructedModel):
         model.arm.require_same(spec.arm, "the model")
+        say_other_gravity(realise(spec.arm, effects).gravity(spec.arm), model.arm)
     reference = as_reference(reference)
     followed = reference.evaluate([0.0])[0].shape[1]
     if not len(gains.kp) == followed == n:

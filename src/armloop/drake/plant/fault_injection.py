@@ -18,11 +18,12 @@ from armloop.laws.effects import EFFECTS as LISTED
 from armloop.laws.effects import REGISTRY, Effect, effect, effect_kind, misplaced, misstated
 from armloop.laws.effects.base import Placed, number
 from armloop.laws.effects.external_contact import ExternalContact
-from armloop.laws.effects.gravity_tilt import GravityTilt, base_rotation
+from armloop.laws.effects.gravity_tilt import GravityTilt
 from armloop.laws.effects.payload import Payload
 from armloop.laws.friction import KINDS
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
+from armloop.robot.levelling import base_rotation
 from armloop.util.arrays import Array
 from armloop.util.errors import ModelError, ScenarioError
 
@@ -113,6 +114,10 @@ class Realisation:
     payloads: list[tuple[float, Array, float | None]] = field(default_factory=list)
     R_WB: Array = field(default_factory=lambda: np.eye(3))
     own: list[Law] = field(default_factory=list)
+
+    def gravity(self, arm: Arm) -> Array:
+        """(3,) gravity in the arm's base frame, m/s²."""
+        return np.asarray(self.R_WB.T @ arm.gravity)
 
 
 def realise(arm: Arm, effects: Effects) -> Realisation:

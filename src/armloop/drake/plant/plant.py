@@ -206,8 +206,8 @@ def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = Non
         )
         moving.set_velocity_limits([-joint.velocity], [joint.velocity])
         parent = body.body_frame()
-    R_WB = np.eye(3) if effects is None else effects.R_WB
-    plant.mutable_gravity_field().set_gravity_vector(R_WB.T @ arm.gravity)
+    gravity = arm.gravity if effects is None else effects.gravity(arm)
+    plant.mutable_gravity_field().set_gravity_vector(gravity)
 
 
 def _spatial_inertia(mass: float, com: Array, inertia: Array) -> SpatialInertia:

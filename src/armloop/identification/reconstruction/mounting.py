@@ -15,6 +15,7 @@ import numpy as np
 from armloop.identification.reconstruction.gravity_direction import Direction, nearby, refined
 from armloop.identification.reconstruction.plain_fits import AS_GOOD, Fit, PlainFits
 from armloop.robot.arm import Arm
+from armloop.robot.levelling import turning
 from armloop.util.arrays import Array
 
 #: The directions that are tried first: towards faces, edges and corners of a cube, no point of the sphere further from one
@@ -59,13 +60,16 @@ class Mounting:
     def note(self) -> str:
         """What was found of a base that leans, and what is done about it."""
         assert self.lean is not None
-        down = ", ".join(f"{x + 0.0:.4f}" for x in self.down)
         angle, error = np.degrees([self.angle, self.lean.std_error])
         return (
-            f"the base leans by {angle:.2f} ± {error:.1g} degrees: gravity acts along ({down}) of the base frame, and the "
-            "model takes it so; turn the base in the URDF (origin rpy of the joint that fixes it to the world) to have "
-            "simulations lean, too"
+            f"the base leans by {angle:.2f} ± {error:.1g} degrees: gravity acts along {vector(self.down, 4)} of the base "
+            f"frame, and the model takes it so; to have simulations lean, too, {turning(self.down)}"
         )
+
+
+def vector(down: Array, digits: int) -> str:
+    """A direction (3,) in words."""
+    return "(" + ", ".join(f"{x + 0.0:.{digits}f}" for x in down) + ")"
 
 
 def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:

@@ -20,18 +20,13 @@ from armloop.laws.effects.base import (
 )
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import LINK_PARAMETERS, regressor
+from armloop.robot.levelling import base_rotation
 from armloop.robot.newton_euler import joint_torques
 from armloop.util.errors import ModelError
 
 #: An axis turned by less than this from the vertical, rad, is upright.
 _UPRIGHT = 1e-3
 _MOMENT = LINK_PARAMETERS.index("mx")
-
-
-def base_rotation(roll: float, pitch: float) -> Array:
-    """R_WB of a base rolled about x, then pitched about y: R_y R_x."""
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    return np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
 
 
 def tilted_gravity(gravity: Array, roll: float, pitch: float) -> Array:

@@ -1,0 +1,56 @@
+"""Orientation of a base in the world, from the direction of gravity in its frame; and the arm as seen from a level base."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from armloop.robot.arm import STANDARD_GRAVITY, Arm
+from armloop.util.arrays import Array
+from armloop.util.doubts import warn
+
+#: Directions that differ by less, in rad, are one.
+_SAME = 1e-3
+_DOWN = np.array(STANDARD_GRAVITY) / np.linalg.norm(STANDARD_GRAVITY)
+
+
+def base_rotation(roll: float, pitch: float) -> Array:
+    """R_WB of a base rolled about x, then pitched about y: R_y R_x, as a URDF's ``rpy="roll pitch 0"``."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    return np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
+
+
+def roll_and_pitch(gravity: Array) -> tuple[float, float]:
+    """Roll and pitch (rad) of a base in whose frame gravity (3,) acts along this direction: what it tells of R_WB."""
+    x, y, z = (float(each) + 0.0 for each in gravity)
+    return float(np.arctan2(-y, -z)) + 0.0, float(np.arctan2(x, np.hypot(y, z)))
+
+
+def say_other_gravity(simulated: Array, arm: Arm, what: str = "the model") -> None:
+    """Warn where a model's arm has gravity along another direction than the simulation, (3,) in the base frame."""
+    there, taken = (each / max(float(np.linalg.norm(each)), 1e-12) for each in (simulated, arm.gravity))
+    angle = float(np.arctan2(np.linalg.norm(np.cross(there, taken)), there @ taken))
+    if angle > _SAME:
+        roll, pitch = roll_and_pitch(arm.gravity)
+        warn(
+            f"{what}: its base leans by {np.degrees(angle):.1f} degrees against the simulated one, and its gravity torques "
+            f"do not fit there; give the simulated arm the effect gravity_tilt (roll {roll:.4f}, pitch {pitch:.4f})"
+        )
+
+
+def turning(gravity: Array) -> str:
+    """How a URDF says that gravity acts along a direction (3,) of the base frame."""
+    angles = "{:.4f} {:.4f}".format(*roll_and_pitch(gravity))
+    return f'turn the base in the URDF (origin rpy="{angles} 0" of the joint that fixes it to the world)'
+
+
+def levelled(arm: Arm) -> Arm:
+    """The arm on a level base, its first joint turned instead: what descriptions without a gravity of their own can say."""
+    g = float(np.linalg.norm(arm.gravity))
+    if not g or np.array_equal(arm.gravity, g * _DOWN):
+        return arm
+    X_PF, turn = arm.X_PF.copy(), np.eye(4)
+    turn[:3, :3] = base_rotation(*roll_and_pitch(arm.gravity))
+    X_PF[0] = turn @ X_PF[0]
+    return replace(arm, X_PF=X_PF, gravity=g * _DOWN)
