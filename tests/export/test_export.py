@@ -97,6 +97,22 @@ def test_a_tilt_reads_back_with_the_first_moment_that_a_level_arm_hides(tmp_path
         assert found.unsaid is not None and (found.unsaid < 1e-6 * found.rms).all()
 
 
+@pytest.mark.parametrize("down", [(-0.05, 0.03, -1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
+@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("target", ["urdf", "sdf", "mjcf", "drake"])
+def test_an_arm_that_leans_does_so_in_every_description(tmp_path, target, name, down):
+    """Its first joint is turned on a level base: a reader's own gravity acts on it as the model's does."""
+    if target == "mjcf":
+        pytest.importorskip("mujoco")
+    arm = replace(ARMS[name], gravity=9.81 * np.array(down) / np.linalg.norm(down))
+    found = export(model_of(arm, disguised(arm, False), friction=PLAIN), target, tmp_path / "arm")
+    assert found.difference is not None and (found.difference < 1e-6 * found.rms).all()
+    assert not any("tilt" in line for line in found.missing)
+    assert any("the base leans" in note for note in found.notes)
+    if target == "mjcf":
+        assert found.unsaid is not None and (found.unsaid < 1e-6 * found.rms).all()
+
+
 @pytest.mark.parametrize("target", ["urdf", "sdf", "drake"])
 def test_what_becomes_of_the_links_names_is_said(tmp_path, target):
     arm = replace(ARMS["three_axis"], X_tool=np.eye(4))

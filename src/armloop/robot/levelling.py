@@ -24,7 +24,7 @@ def base_rotation(roll: float, pitch: float) -> Array:
 def roll_and_pitch(gravity: Array) -> tuple[float, float]:
     """Roll and pitch (rad) of a base in whose frame gravity (3,) acts along this direction: what it tells of R_WB."""
     x, y, z = (float(each) + 0.0 for each in gravity)
-    return float(np.arctan2(-y, -z)) + 0.0, float(np.arctan2(x, np.hypot(y, z)))
+    return float(np.arctan2(0.0 - y, 0.0 - z)), float(np.arctan2(x, np.hypot(y, z)))
 
 
 def say_other_gravity(simulated: Array, arm: Arm, what: str = "the model") -> None:

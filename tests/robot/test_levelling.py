@@ -1,0 +1,57 @@
+"""A base's roll and pitch from the direction of gravity in its frame, and the arm as seen from a level base."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from armloop.robot.arm import load_arm
+from armloop.robot.kinematics import nominal_parameters
+from armloop.robot.levelling import base_rotation, levelled, roll_and_pitch, say_other_gravity, turning
+from armloop.robot.newton_euler import joint_torques
+from armloop.util.errors import InputWarning
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_roll_and_pitch_put_gravity_straight_down(seed: int) -> None:
+    gravity = np.random.default_rng(seed).normal(size=3)
+    roll, pitch = roll_and_pitch(gravity)
+    R = base_rotation(roll, pitch)
+    np.testing.assert_allclose(R, Rotation.from_euler("xyz", [roll, pitch, 0.0]).as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(R @ gravity, [0.0, 0.0, -np.linalg.norm(gravity)], atol=1e-12)
+
+
+def test_a_level_base_is_not_turned_and_one_upside_down_is_by_half_a_turn() -> None:
+    assert roll_and_pitch(np.array([0.0, 0.0, -9.81])) == (0.0, 0.0)
+    assert roll_and_pitch(np.array([-0.0, -0.0, -9.81])) == (0.0, 0.0)
+    assert roll_and_pitch(np.array([0.0, 0.0, 9.81])) == (pytest.approx(np.pi), 0.0)
+    assert turning(np.array([9.81, 0.0, 0.0])).count('rpy="0.0000 1.5708 0"') == 1
+    arm = load_arm("scara")
+    assert levelled(arm) is arm
+    weightless = replace(arm, gravity=np.zeros(3))
+    assert levelled(weightless) is weightless
+
+
+@pytest.mark.parametrize("name", ["three_axis", "scara"])
+def test_a_levelled_arm_has_the_same_torques(name: str) -> None:
+    arm = replace(load_arm(name), gravity=np.array([-0.7, 0.4, -9.7]))
+    level = levelled(arm)
+    np.testing.assert_allclose(level.gravity, [0.0, 0.0, -np.linalg.norm(arm.gravity)])
+    q, v, vdot = np.random.default_rng(1).normal(size=(3, 20, arm.n))
+    links = nominal_parameters(arm)
+    np.testing.assert_allclose(
+        joint_torques(level, links, q, v, vdot), joint_torques(arm, links, q, v, vdot), atol=1e-10
+    )
+
+
+def test_a_simulation_that_stands_otherwise_is_said() -> None:
+    arm = load_arm("three_axis")
+    leaning = replace(arm, gravity=base_rotation(0.03, -0.05).T @ arm.gravity)
+    with pytest.warns(InputWarning, match=r"mine: .* by 3\.3 degrees .* \(roll 0\.0300, pitch -0\.0500\)"):
+        say_other_gravity(arm.gravity, leaning, "mine")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        say_other_gravity(leaning.gravity, leaning)
+        say_other_gravity(arm.gravity, arm)
