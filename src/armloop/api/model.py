@@ -26,6 +26,7 @@ from armloop.model import load_model as read_model
 from armloop.regression.sparse import Sparse
 from armloop.reports.tables import formulas, score_table, steps_table
 from armloop.robot.arm import Arm
+from armloop.robot.levelling import of_a_lean
 from armloop.util.errors import InputError
 from armloop.util.files import write_text
 from armloop.util.given import numbers_of, require
@@ -134,6 +135,8 @@ class Model(ReconstructedModel):
             ]
         parts.append("\n".join([formulas(self), *self.legend()]))
         parts += [added.effect.sentence(added.parameters) for added in self.effects]
+        if lean := self.history.get("leaning"):
+            parts.append(of_a_lean(**lean))
         return "\n\n".join(parts)
 
     def _repr_html_(self) -> str:

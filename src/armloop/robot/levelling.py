@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +38,20 @@ def say_other_gravity(simulated: Array, arm: Arm, what: str = "the model") -> No
             f"{what}: its base leans by {np.degrees(angle):.1f} degrees against the simulated one, and its gravity torques "
             f"do not fit there; give the simulated arm the effect gravity_tilt (roll {roll:.4f}, pitch {pitch:.4f})"
         )
+
+
+def of_a_lean(gravity: Sequence[float], angle: float, std_error: float) -> str:
+    """What is said of a base that leans, from its direction of gravity (3,) and the angle with its standard error, rad."""
+    angle, error = np.degrees([angle, std_error]).tolist()
+    return (
+        f"the base leans by {angle:.2f} ± {error:.1g} degrees: gravity acts along {vector(gravity, 4)} of the base frame, "
+        f"and the model takes it so; for a URDF that says it, {turning(np.array(gravity))} and reconstruct with that"
+    )
+
+
+def vector(components: Sequence[float], digits: int) -> str:
+    """A vector in words."""
+    return "(" + ", ".join(f"{float(x) + 0.0:.{digits}f}" for x in components) + ")"
 
 
 def turning(gravity: Array) -> str:

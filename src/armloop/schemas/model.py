@@ -184,6 +184,14 @@ class EncoderZerosData(Struct):
     errors: dict[Text, NotNegative] = {}
 
 
+class LeaningData(Struct):
+    """How the base was found to lean: the direction of gravity in its frame, the angle and its standard error, rad."""
+
+    gravity: Vector3
+    angle: NotNegative
+    std_error: NotNegative
+
+
 class HistoryData(Struct):
     """How the model came about; what else stands there is kept as it is."""
 
@@ -197,6 +205,7 @@ class HistoryData(Struct):
     slowest: Annotated[list[NotNegative], _Joints] | UnsetType = UNSET
     inertial: Annotated[list[_SUM], Meta(max_length=10 * MOST_JOINTS)] | UnsetType = UNSET
     encoder_zeros: EncoderZerosData | UnsetType = UNSET
+    leaning: LeaningData | UnsetType = UNSET
 
 
 class ErrorData(Struct):

@@ -8,6 +8,7 @@ import pytest
 from leaning_arm import three_axes, turned_by, upright_axes
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
+from armloop.api.model import load_model as api_load
 from armloop.data.log import read_log
 from armloop.data.signals import preprocess
 from armloop.identification.reconstruction import reconstruct
@@ -101,6 +102,7 @@ def test_a_model_of_an_arm_that_leans_has_gravity_as_it_is(library: str, tmp_pat
     kept = load_model(tmp_path / "model.json", three_axis())
     np.testing.assert_allclose(kept.arm.gravity, leaning.gravity, atol=0.1)
     assert kept.history["leaning"]["angle"] == pytest.approx(np.radians(6.0), abs=0.01)
+    assert said in str(api_load(tmp_path / "model.json"))
     other = preprocess([three_axes(3, leaning, 0.3)], kept.conditioning)
     assert max(score(kept, other).moving["nrmse"]) < 0.02
 

@@ -15,7 +15,7 @@ import numpy as np
 from armloop.identification.reconstruction.gravity_direction import Direction, nearby, refined
 from armloop.identification.reconstruction.plain_fits import AS_GOOD, Fit, PlainFits
 from armloop.robot.arm import Arm
-from armloop.robot.levelling import turning
+from armloop.robot.levelling import of_a_lean
 from armloop.util.arrays import Array
 
 #: The directions that are tried first: towards faces, edges and corners of a cube, no point of the sphere further from one
@@ -60,16 +60,7 @@ class Mounting:
     def note(self) -> str:
         """What was found of a base that leans, and what is done about it."""
         assert self.lean is not None
-        angle, error = np.degrees([self.angle, self.lean.std_error])
-        return (
-            f"the base leans by {angle:.2f} ± {error:.1g} degrees: gravity acts along {vector(self.down, 4)} of the base "
-            f"frame, and the model takes it so; to have simulations lean, too, {turning(self.down)}"
-        )
-
-
-def vector(down: Array, digits: int) -> str:
-    """A direction (3,) in words."""
-    return "(" + ", ".join(f"{x + 0.0:.{digits}f}" for x in down) + ")"
+        return of_a_lean(**self.to_dict())
 
 
 def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from armloop.data.log import MotionLog, unchecked_log
-from armloop.identification.reconstruction.mounting import Mounting, other_mounting, vector
+from armloop.identification.reconstruction.mounting import Mounting, other_mounting
 from armloop.identification.reconstruction.plain_fits import AS_GOOD, GOOD, Fit, PlainFits
 from armloop.robot.arm import Arm
-from armloop.robot.levelling import turning
+from armloop.robot.levelling import turning, vector
 from armloop.util.arrays import Array, Index
 
 #: Mean relative error below which a record is taken as it stands; of a joint that is met so well, better says nothing.
@@ -107,10 +107,9 @@ class Reading(NamedTuple):
         if self.unit:
             return f"angles seem to be in {self.unit}: read so {better}; give q in rad and v in rad/s"
         if self.down:
-            down = np.array(self.down)
             return (
                 "the arm seems to be mounted otherwise than its URDF says: with gravity along "
-                f"{vector(down, 2)} of the base frame {better}; {turning(down)}"
+                f"{vector(self.down, 2)} of the base frame {better}; {turning(np.array(self.down))}"
             )
         if self.turned:
             return (
