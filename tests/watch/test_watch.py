@@ -1,6 +1,7 @@
 """A fleet is watched: what changed is found and named, what did not is left alone, what is broken is set aside."""
 
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -18,6 +19,7 @@ from armloop.reports.watch_report import _cards
 from armloop.util.errors import InputWarning
 from armloop.watch import Options, watch
 from armloop.watch.fleet import model_and_digest
+from armloop.watch.history import Head
 from armloop.watch.sources import find_logs, recorded_at
 from armloop.watch.store import Store
 from armloop.watch.verdicts import whole_history
@@ -239,16 +241,38 @@ def test_arm_programme_and_warmth_come_from_columns(fleet: Path, tmp_path: Path)
 
 
 def test_when_a_log_was_recorded(tmp_path: Path) -> None:
-    day = tmp_path / "2025-03-04"
-    day.mkdir()
-    for name, expected in (
-        ("run_20240131T120530.csv", 1706702730.0),
-        ("2024-01-31.csv", 1706659200.0),
-        ("20249931.csv", 1741046400.0),  # no date: its folder's
-    ):
+    day = tmp_path / "2020-01-01" / "fleet" / "arm" / "2025-03-04"
+    day.mkdir(parents=True)
+    expected = {
+        "run_20240131T120530.csv": 1706702730.0,
+        "2024-01-31.csv": 1706659200.0,
+        "2024-01-31_run-10-20-30.csv": 1706659200.0,
+        "20249931.csv": 1741046400.0,  # no date: its folder's
+        "14-30-05.csv": 1741046400.0 + 14 * 3600 + 30 * 60 + 5,
+        "run_143005.csv": 1741046400.0 + 14 * 3600 + 30 * 60 + 5,
+        "run_14_31.csv": 1741046400.0,
+        "run_256199.csv": 1741046400.0,
+    }
+    for name in expected:
         (day / name).touch()
-        assert recorded_at(day / name, 0.0) == expected
-    assert recorded_at(day / name, 1.7e9) == 1.7e9
+    found = {file.path.name: file for file in find_logs([tmp_path / "2020-01-01" / "fleet"])}
+    assert {name: recorded_at(file, 0.0) for name, file in found.items()} == expected
+    assert recorded_at(found["2024-01-31.csv"], 1.7e9) == 1.7e9
+    # what the fleet is kept in says nothing of its logs
+    bare = day.parent / "run.csv"
+    bare.touch()
+    os.utime(bare, (1.6e9, 1.6e9))
+    for place in (tmp_path / "2020-01-01" / "fleet", bare):
+        (file,) = [each for each in find_logs([place]) if each.path == bare]
+        assert recorded_at(file, 0.0) == 1.6e9
+
+
+def test_logs_of_one_moment_are_in_natural_order() -> None:
+    names = ["run10", "run2", "run02b", "run", "2", "Run1", "run2b"]
+    heads = [Head(1.0, name, "", "", Path()) for name in names]
+    assert [head.name for head in sorted(heads)] == ["2", "Run1", "run", "run2", "run02b", "run2b", "run10"]
+    assert Head(0.5, "run10", "", "", Path()) < heads[0] and heads[0] >= heads[1]
+    assert sorted([Head(1.0, "run2", log, "", Path()) for log in "ba"])[0].log == "a"
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
+from functools import cached_property, total_ordering
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,13 @@ from armloop.util.errors import InputError
 from armloop.watch.store import PER_BLOCK, PER_JOINT, digests, matrix, read_table
 
 
-@dataclass(frozen=True, order=True)
+def natural(name: str) -> tuple[str | int, ...]:
+    """A name in natural order: numbers in it by their value, so that run10 comes after run2."""
+    return tuple(int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name))
+
+
+@total_ordering
+@dataclass(frozen=True)
 class Head:
     """What a stored log is, without its sums; logs are in order by when they began, their name, and their digest."""
 
@@ -28,6 +36,13 @@ class Head:
     log: str
     programme: str
     path: Path
+
+    def __lt__(self, other: Head) -> bool:
+        return self._place < other._place
+
+    @cached_property
+    def _place(self) -> tuple[float, tuple[str | int, ...], str]:
+        return self.when, natural(self.name), self.log
 
     @staticmethod
     def read(path: Path) -> tuple[Head, tuple[Column, ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from armloop.monitoring.sums import log_sums
@@ -89,7 +89,7 @@ def ingest(
         elif (digest, model) in aside:
             counts += Counts(aside=1)
         else:
-            todo.setdefault((arm, path), []).append((LogFile(file.path, arm, programme), digest))
+            todo.setdefault((arm, path), []).append((replace(file, arm=arm, programme=programme), digest))
     pieces = _side_by_side(store.folder, todo)
     total, done = sum(len(piece.files) for piece in pieces), 0
     for answer in workers.map(read_piece, pieces) if pieces else ():

@@ -21,6 +21,8 @@ from armloop.util.errors import InputError, LogError
 _DATE = re.compile(
     r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?:[T _-]?([0-2]\d)[-_.:hH]?([0-5]\d)(?:[-_.:mM]?([0-5]\d))?)?(?!\d)"
 )
+#: A time of day in the name of a log whose folder has the date.
+_TIME = re.compile(r"(?<!\d)([01]\d|2[0-3])([-_.:hH]?)([0-5]\d)(?:\2|[mM])([0-5]\d)(?!\d)")
 #: A clock that shows more than this counts seconds since 1970 (2001-09-09), not since the log began.
 _EPOCH = 1e9
 _TEMPERATURES = re.compile(r"temperature(\d{0,3})")
@@ -35,11 +37,13 @@ class LogFile:
         path: of the CSV or Parquet file.
         arm: the arm it is of, by its folder; empty if only a column can tell.
         programme: the programme that the arm ran, by the folders below the arm's; may be empty.
+        folders: the names of those that it is in, the innermost first, as far as they tell of it.
     """
 
     path: Path
     arm: str
     programme: str
+    folders: tuple[str, ...] = ()
 
     def digest(self) -> str:
         """32 hexadecimal digits of the SHA-256 of the content.
@@ -74,9 +78,13 @@ def find_logs(places: Sequence[str | Path]) -> list[LogFile]:
         if place.is_dir():
             for path in _below(place):
                 inside = path.relative_to(place).parts[:-1]
-                found[path] = LogFile(path, inside[0] if inside else "", _programme(inside[1:]))
+                arm = inside[0] if inside else ""
+                found[path] = LogFile(
+                    path, arm, _programme(inside[1:]), (*reversed(inside), place.resolve().name)
+                )
         elif place.is_file():
-            found[place] = LogFile(place, place.resolve().parent.name, "")
+            folder = place.resolve().parent.name
+            found[place] = LogFile(place, folder, "", (folder,))
         else:
             raise InputError(
                 f"{place}: no such file or folder; --logs takes DIR/ARM/*.csv, files, or - for a list"
@@ -152,7 +160,7 @@ def read_recording(file: LogFile, model: ReconstructedModel) -> Recording:
     log = read_log(
         file.path, joints=model.arm.n, tau_unit=recorded["unit"], drive_gains=recorded["drive_gains"]
     )
-    return Recording(log, _extra(file.path, model.arm.n), recorded_at(file.path, float(log.time[0])))
+    return Recording(log, _extra(file.path, model.arm.n), recorded_at(file, float(log.time[0])))
 
 
 def _extra(path: Path, n: int) -> dict[str, Array]:
@@ -176,23 +184,26 @@ def _extra(path: Path, n: int) -> dict[str, Array]:
     return extra
 
 
-def recorded_at(path: Path, first: float) -> float:
+def recorded_at(file: LogFile, first: float) -> float:
     """When a log began, s since 1970: by its clock, else by a date in its name or its folders', else by the file's own.
+
+    A time of day in the name counts beside a date of the folder.
 
     Args:
         first: the log's first time, s.
     """
     if first > _EPOCH:
         return first
-    for name in (path.name, *(parent.name for parent in path.parents)):
+    for name in (file.path.name, *file.folders):
         for match in _DATE.finditer(name):
-            parts = [int(part) if part else 0 for part in match.groups()]
+            year, month, day, hour, minute, second = (int(part) if part else 0 for part in match.groups())
+            if match[4] is None and (time := _TIME.search(file.path.name)) and name != file.path.name:
+                hour, minute, second = int(time[1]), int(time[3]), int(time[4])
             try:
-                year, month, day, hour, minute, second = parts
                 return datetime(year, month, day, hour, minute, second, tzinfo=UTC).timestamp()
             except ValueError:
                 continue
-    return float(int(path.stat().st_mtime))
+    return float(int(file.path.stat().st_mtime))
 
 
 def day_of(when: float) -> str:
