@@ -134,7 +134,7 @@ class TestWhole:
         monkeypatch.setattr(torque_checks, "Problem", Given)
         monkeypatch.setattr(torque_checks, "even_selection", lambda logs: logs)
         monkeypatch.setattr(torque_checks, "is_time_series", lambda q, runs: q)
-        monkeypatch.setattr(torque_checks, "meant", lambda *_: None)
+        monkeypatch.setattr(torque_checks, "meant", lambda *_: ("", None))
         return asked
 
     @staticmethod
