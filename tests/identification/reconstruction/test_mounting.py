@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 from leaning_arm import three_axes, turned_by, upright_axes
-from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+from synthetic import fourier_motion, friction, rigid_torque, three_axis
+from synthetic import measured as recorded
 
 from armloop.api.model import load_model as api_load
 from armloop.data.log import read_log
@@ -56,7 +57,32 @@ def test_a_level_base_does_not_lean_whatever_else_acts(seed: int) -> None:
         0.15 * tau * second,
         elsewhere,
     ):
-        assert check_torques([measured(motion, tau + law, seed)], arm, 10.0) is None
+        assert check_torques([recorded(motion, tau + law, seed)], arm, 10.0) is None
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+@pytest.mark.parametrize("size", [0.1, 0.2])
+def test_laws_of_one_joint_on_short_strokes_are_no_other_mounting(seed: int, size: float) -> None:
+    """There gravity's sine is as good a line as a spring's, and one direction is as good as another."""
+    arm, motion = three_axis(), fourier_motion(60.0, 100.0, seed, size=size)
+    q, first = motion.q, np.eye(3)[0]
+    tau = rigid_torque(arm, q, motion.v, motion.vdot) + 0.3 * friction(motion.v)
+    for law in (5 * (q[:, 0] - 0.05), 2 * np.sin(q[:, 0] - q[:, 1]), 5 * q[:, 0] * q[:, 1]):
+        assert check_torques([recorded(motion, tau + np.outer(law, first), seed)], arm, 10.0) is None
+
+
+@pytest.mark.measured
+@pytest.mark.parametrize("seed", [1, 2])
+def test_an_encoders_zero_is_no_lean(measured: Path, seed: int) -> None:
+    """A base that leans by 1.5 degrees would explain all joints but the first better, and that far worse."""
+    arm = load_arm(measured / "panda" / "panda.urdf")
+    motion = fourier_motion(60.0, 100.0, seed, arm)
+    tau = rigid_torque(arm, motion.q, motion.v, motion.vdot)
+    size = np.sqrt(np.mean(tau**2, axis=0))
+    rubbing = size * (0.15 * np.sign(motion.v) + 0.1 * motion.v)
+    off = 0.05 * np.eye(7)[1]
+    tau = rigid_torque(arm, motion.q + off, motion.v, motion.vdot) + rubbing
+    assert check_torques([recorded(motion, tau, seed)], arm, 10.0) is None
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -126,12 +126,6 @@ class PlainFits:
         """The same with a spring at every joint."""
         return self.beside(self.table.motion.q[:, :, None] * np.eye(self.arm.n))
 
-    def waved(self) -> Self:
-        """The same with a spring at every joint and the sine and cosine of its angle."""
-        q = self.table.motion.q
-        own = [x[:, :, None] * np.eye(self.arm.n) for x in (q, np.sin(q), np.cos(q))]
-        return self.beside(np.concatenate(own, axis=2))
-
     def beside(self, columns: Array) -> Self:
         """The same with more columns (N, n, p), after the others."""
         both = np.concatenate([self.table.columns, columns], axis=2)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armloop.data.log import MotionLog, unchecked_log
-from armloop.identification.reconstruction.mounting import Mounting, other_mounting
+from armloop.identification.reconstruction.mounting import SECOND, Mounting, other_mounting
 from armloop.identification.reconstruction.plain_fits import AS_GOOD, GOOD, Fit, PlainFits
 from armloop.robot.arm import Arm
 from armloop.robot.levelling import turning, vector
@@ -93,7 +93,8 @@ class Reading(NamedTuple):
             each = [plain.over(other, [j], _GOOD_ENOUGH) for j in range(len(self.order))]
             best, mean, worst = _SENSE
             better = max(each) > best and plain.over(other, least=_GOOD_ENOUGH) > mean and min(each) > worst
-            return better and sprung.over(other) > 1
+            alone = bool(self.down) and min(sorted(each)[-2:]) < SECOND
+            return better and not alone and sprung.over(other) > 1
         return plain.over(other) > (_UNIT if self.unit else _ORDER)
 
     def which(self) -> str:
