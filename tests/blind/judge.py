@@ -80,9 +80,10 @@ def _carried_then(load: dict[str, Any], found: dict[str, Any]) -> bool:
 def is_named(hidden: dict[str, Any], effect: dict[str, Any]) -> bool:
     """Whether one effect of a verdict is, or has as its alternative, one that was hidden; unlisted, that some law was."""
     if effect["effect"] == "unlisted":
-        return any(
-            truth["name"] == "unlisted" and truth["joint"] == effect["joint"] for truth in hidden["effects"]
-        )
+        # our own arms have the law beside the listed effects, its joint from 0
+        laws = [truth["joint"] for truth in hidden["effects"] if truth["name"] == "unlisted"]
+        laws += [hidden["extra"]["joint"] + 1] if hidden.get("extra") else []
+        return effect["joint"] in laws
     if hidden["kind"] == "event":
         return _meets(hidden["effects"][0], effect)
     stands_for = {place(effect), *(place(rival) for rival in effect["alternatives"])}
