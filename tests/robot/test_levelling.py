@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from armloop.robot.arm import load_arm
+from armloop.robot.arm import Arm, load_arm
 from armloop.robot.kinematics import nominal_parameters
-from armloop.robot.levelling import base_rotation, levelled, roll_and_pitch, say_other_gravity, turning
+from armloop.robot.levelling import base_rotation, levelled, roll_and_pitch, say_other_stance, turning
 from armloop.robot.newton_euler import joint_torques
 from armloop.util.errors import InputWarning
 
@@ -50,8 +50,28 @@ def test_a_simulation_that_stands_otherwise_is_said() -> None:
     arm = load_arm("three_axis")
     leaning = replace(arm, gravity=base_rotation(0.03, -0.05).T @ arm.gravity)
     with pytest.warns(InputWarning, match=r"mine: .* by 3\.3 degrees .* \(roll 0\.0300, pitch -0\.0500\)"):
-        say_other_gravity(arm.gravity, leaning, "mine")
+        say_other_stance(arm, arm.gravity, leaning, "mine")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        say_other_gravity(leaning.gravity, leaning)
-        say_other_gravity(arm.gravity, arm)
+        say_other_stance(arm, leaning.gravity, leaning)
+        say_other_stance(arm, arm.gravity, arm)
+        say_other_stance(arm.with_zero(1, 0.05), arm.gravity, arm.with_zero(1, 0.05))
+    with pytest.warns(InputWarning, match=r"the model: its zero of joint 2 is 0\.0500 rad off"):
+        say_other_stance(arm, arm.gravity, arm.with_zero(1, 0.05))
+
+
+@pytest.mark.parametrize("name", ["three_axis", "scara"])
+def test_another_zero_is_the_same_arm_further_on(name: str) -> None:
+    arm = load_arm(name)
+    off = arm.with_zero(1, 0.2).with_zero(0, -0.1).with_zero(1, 0.1)
+    np.testing.assert_allclose(off.zeros[:2], [-0.1, 0.3])
+    q, v, vdot = np.random.default_rng(1).normal(size=(3, 20, arm.n))
+    links = nominal_parameters(arm)
+    np.testing.assert_allclose(
+        joint_torques(off, links, q, v, vdot), joint_torques(arm, links, q + off.zeros, v, vdot), atol=1e-12
+    )
+    assert off.fingerprint() == arm.fingerprint()
+    off.require_same(arm, "model")
+    again = Arm.from_dict(off.to_dict())
+    np.testing.assert_array_equal(again.zeros, off.zeros)
+    assert again.fingerprint() == arm.fingerprint() and "zeros" not in arm.to_dict()

@@ -26,7 +26,7 @@ from armloop.model import load_model as read_model
 from armloop.regression.sparse import Sparse
 from armloop.reports.tables import formulas, score_table, steps_table
 from armloop.robot.arm import Arm
-from armloop.robot.levelling import of_a_lean
+from armloop.robot.levelling import of_a_lean, of_a_zero
 from armloop.util.errors import InputError
 from armloop.util.files import write_text
 from armloop.util.given import numbers_of, require
@@ -137,6 +137,7 @@ class Model(ReconstructedModel):
         parts += [added.effect.sentence(added.parameters) for added in self.effects]
         if lean := self.history.get("leaning"):
             parts.append(of_a_lean(**lean))
+        parts += [of_a_zero(**zero) for zero in self.history.get("zeros", [])]
         return "\n\n".join(parts)
 
     def _repr_html_(self) -> str:

@@ -134,6 +134,10 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
         notes.append(
             f'the base leans: in the file it is level, and the first joint turned (rpy="{roll:.4f} {pitch:.4f} 0")'
         )
+    for j in np.flatnonzero(arm.zeros).tolist():
+        notes.append(
+            f"joint {j + 1} has another zero than in its URDF, by {arm.zeros[j]:.4f} rad: its origin is turned"
+        )
     return Said(level, found.links, found.rotors, damping, dry, stiffness, rest, gravity, missing, notes)
 
 

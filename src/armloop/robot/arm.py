@@ -11,13 +11,13 @@ import hashlib
 import json
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from armloop.robot.urdf import as_of_a_body, base_links, read_urdf, serial_chain
+from armloop.robot.urdf import as_of_a_body, base_links, read_urdf, rotation_about, serial_chain
 from armloop.util.arrays import Array, Mask
 from armloop.util.errors import ArmError
 from armloop.util.given import path_of, require
@@ -68,6 +68,8 @@ class Arm:
             inertia about M_i's origin. They may be dummies in a URDF made for kinematics.
         X_tool: (4, 4) pose of the link ``tool`` in M_n, the identity without such a link.
         gravity: (3,) m/s² in the base frame.
+        zeros: (n,) rad by which the joints are further than their positions say, by the URDF's zeros; ``X_PF`` has them
+            already. All zero but for an arm whose records have shown otherwise.
         urdf: the URDF's text, empty for an arm rebuilt from a model file.
     """
 
@@ -81,6 +83,7 @@ class Arm:
     X_tool: Array = field(default_factory=lambda: np.eye(4))
     gravity: Array = field(default_factory=lambda: np.array(STANDARD_GRAVITY))
     urdf: str = ""
+    zeros: Array = field(default_factory=lambda: np.zeros(0))
 
     def __repr__(self) -> str:
         return f"<armloop.Arm {self.name}: {self.n} joint{'s' if self.n > 1 else ''}, {self.mass.sum():.3g} kg moving>"
@@ -130,14 +133,25 @@ class Arm:
         """Unit of each joint's generalized force."""
         return [joint.torque_unit for joint in self.joints]
 
+    def with_zero(self, joint: int, angle: float) -> Arm:
+        """The arm whose turning joint (0-based) is further by an angle in rad than its position says."""
+        X_PF, zeros = self.X_PF.copy(), np.zeros(self.n)
+        X_PF[joint, :3, :3] = X_PF[joint, :3, :3] @ rotation_about(self.axis[joint], angle)
+        zeros[: len(self.zeros)] = self.zeros
+        zeros[joint] += angle
+        return replace(self, X_PF=X_PF, zeros=zeros)
+
     def fingerprint(self) -> str:
-        """Digest of the joint kinds and the kinematics: two arms that agree in it move alike.
+        """Digest of the joint kinds and the kinematics of the URDF: two arms that agree in it move alike.
 
         Masses do not enter: a model is made for a geometry, and nominal inertias are often dummies.
         """
+        X_PF = self.X_PF.copy()
+        for j in np.flatnonzero(self.zeros).tolist():
+            X_PF[j, :3, :3] = X_PF[j, :3, :3] @ rotation_about(self.axis[j], -self.zeros[j])
         parts = {
             "kinds": [joint.kind for joint in self.joints],
-            "X_PF": _rounded(self.X_PF),
+            "X_PF": _rounded(X_PF),
             "axis": _rounded(self.axis),
         }
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
@@ -154,12 +168,15 @@ class Arm:
             "fingerprint": self.fingerprint(),
             "joints": joints,
             **{key: getattr(self, key).tolist() for key in _ARRAYS},
+            **({"zeros": self.zeros.tolist()} if self.zeros.any() else {}),
         }
 
     @staticmethod
     def from_dict(data: dict[str, Any]) -> Arm:
         """Rebuild an arm from :meth:`to_dict`, the content of a file as `armloop.schemas.model` checks it."""
-        arrays: dict[str, Any] = {key: np.array(data[key], dtype=float) for key in _ARRAYS}
+        arrays: dict[str, Any] = {
+            key: np.array(data[key], dtype=float) for key in (*_ARRAYS, "zeros") if key in data
+        }
         return Arm(data["name"], tuple(Joint(**joint) for joint in data["joints"]), **arrays)
 
     def require_same(self, other: Arm, what: str) -> None:

@@ -28,15 +28,27 @@ def roll_and_pitch(gravity: Array) -> tuple[float, float]:
     return float(np.arctan2(0.0 - y, 0.0 - z)), float(np.arctan2(x, np.hypot(y, z)))
 
 
-def say_other_gravity(simulated: Array, arm: Arm, what: str = "the model") -> None:
-    """Warn where a model's arm has gravity along another direction than the simulation, (3,) in the base frame."""
-    there, taken = (each / max(float(np.linalg.norm(each)), 1e-12) for each in (simulated, arm.gravity))
+def say_other_stance(simulated: Arm, gravity: Array, model: Arm, what: str = "the model") -> None:
+    """Warn where a model's arm stands otherwise than the simulated one: its base leans, or joints have other zeros.
+
+    Args:
+        gravity: (3,) of the simulation in the base frame.
+    """
+    there, taken = (each / max(float(np.linalg.norm(each)), 1e-12) for each in (gravity, model.gravity))
     angle = float(np.arctan2(np.linalg.norm(np.cross(there, taken)), there @ taken))
     if angle > _SAME:
-        roll, pitch = roll_and_pitch(arm.gravity)
+        roll, pitch = roll_and_pitch(model.gravity)
         warn(
             f"{what}: its base leans by {np.degrees(angle):.1f} degrees against the simulated one, and its gravity torques "
             f"do not fit there; give the simulated arm the effect gravity_tilt (roll {roll:.4f}, pitch {pitch:.4f})"
+        )
+    zeros = np.zeros((2, model.n))
+    for row, arm in zip(zeros, (simulated, model), strict=True):
+        row[: len(arm.zeros)] = arm.zeros
+    for j in np.flatnonzero(np.abs(zeros[1] - zeros[0]) > _SAME).tolist():
+        warn(
+            f"{what}: its zero of joint {j + 1} is {zeros[1, j] - zeros[0, j]:.4f} rad off the simulated arm's, and its "
+            "torques do not fit there; simulate the arm that the model is of (model.arm)"
         )
 
 
@@ -47,6 +59,25 @@ def of_a_lean(gravity: Sequence[float], angle: float, std_error: float) -> str:
         f"the base leans by {angle:.2f} ± {error:.1g} degrees: gravity acts along {vector(gravity, 4)} of the base frame, "
         f"and the model takes it so; for a URDF that says it, {turning(np.array(gravity))} and reconstruct with that"
     )
+
+
+def of_a_zero(joint: int, angle: float, std_error: float) -> str:
+    """What is said of a joint (from 1) that is further by an angle, with its standard error, than its position says, rad."""
+    side = "further" if angle > 0 else "less far"
+    return (
+        f"joint {joint} is {abs(angle):.4f} ± {std_error:.1g} rad {side} than q{joint} says by the URDF's zero, and the "
+        f"model takes it so; {_where_the_zero_is(joint, angle)}"
+    )
+
+
+def of_another_zero(joint: int, angle: float) -> str:
+    """What is said of a joint (from 1) that counts from another zero than the URDF, which is further by an angle, rad."""
+    return f"joint {joint} counts from another zero than the URDF's; {_where_the_zero_is(joint, angle)}: with that"
+
+
+def _where_the_zero_is(joint: int, angle: float) -> str:
+    sign = "+" if angle > 0 else "-"
+    return f"give q{joint} {sign} {abs(angle):.4f}, or turn the joint's origin about its axis in the URDF"
 
 
 def vector(components: Sequence[float], digits: int) -> str:

@@ -62,6 +62,7 @@ class ArmData(Struct):
     inertia: Annotated[list[Matrix3], _Joints]
     X_tool: Pose
     gravity: Vector3
+    zeros: PerJoint | UnsetType = UNSET
     fingerprint: Name = ""
 
 
@@ -192,6 +193,14 @@ class LeaningData(Struct):
     std_error: NotNegative
 
 
+class ZeroData(Struct):
+    """By what angle a joint (from 1) was found to be further than its position says, and its standard error, rad."""
+
+    joint: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
+    angle: Finite
+    std_error: NotNegative
+
+
 class HistoryData(Struct):
     """How the model came about; what else stands there is kept as it is."""
 
@@ -206,6 +215,7 @@ class HistoryData(Struct):
     inertial: Annotated[list[_SUM], Meta(max_length=10 * MOST_JOINTS)] | UnsetType = UNSET
     encoder_zeros: EncoderZerosData | UnsetType = UNSET
     leaning: LeaningData | UnsetType = UNSET
+    zeros: Annotated[list[ZeroData], Meta(max_length=MOST_JOINTS)] | UnsetType = UNSET
 
 
 class ErrorData(Struct):

@@ -29,7 +29,7 @@ from armloop.drake.view.live import LiveView
 from armloop.identification.goodness import extrapolated
 from armloop.identification.reconstruction import reconstruct
 from armloop.model import ReconstructedModel
-from armloop.robot.levelling import say_other_gravity
+from armloop.robot.levelling import say_other_stance
 from armloop.util.doubts import warn
 from armloop.util.files import write_figure, write_json
 from armloop.util.finite import finite
@@ -92,7 +92,7 @@ def _say_doubts(scenario: TrackingScenario, models: Mapping[str, ReconstructedMo
     motion = Motion(time, *scenario.reference.evaluate(time))
     gravity = realise(scenario.plant.arm, scenario.effects).gravity(scenario.plant.arm)
     for name, model in models.items():
-        say_other_gravity(gravity, model.arm, f"{scenario.name}, model {name}")
+        say_other_stance(scenario.plant.arm, gravity, model.arm, f"{scenario.name}, model {name}")
         for words in extrapolated(scenario.plant.arm, motion, model.history.get("range")):
             warn(f"{scenario.name}, model {name}: {words}; what it feeds forward there is extrapolated")
 

@@ -11,6 +11,7 @@ from leaning_arm import upright_axes
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog, read_log, unchecked_log
+from armloop.identification.reconstruction import readings as readings_module
 from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
 from armloop.identification.reconstruction.readings import Reading, meant, readings
 from armloop.identification.reconstruction.torque_checks import check_torques
@@ -84,7 +85,7 @@ def test_orders_and_units_are_named(seed: int, dry: float) -> None:
 def test_joints_that_count_the_other_way_are_named(seed: int, joints: tuple[int, ...], words: str) -> None:
     log = turned(run(seed, 1.0), joints)
     if not words:
-        check_torques([log], three_axis(), 10.0)
+        assert check_torques([log], three_axis(), 10.0) == []
         return
     with pytest.raises(LogError, match=words):
         check_torques([log], three_axis(), 10.0)
@@ -236,6 +237,7 @@ def chosen(plain: Fit, others: dict[str, Fit], monkeypatch: pytest.MonkeyPatch) 
     """What is said of a record of two joints."""
     given: Any = Given(plain, others)
     monkeypatch.setattr(PlainFits, "of", given.of)
+    monkeypatch.setattr(readings_module, "other_zero", lambda problem, plain: None)
     q = np.zeros((3, len(plain.relative)))
     log = unchecked_log(time=np.arange(3.0), q=q, v=q, tau=q, name="run")
     return meant(given, [log], 10.0, plain)[0]

@@ -24,7 +24,7 @@ from armloop.drake.plant.plant import ArmPlant
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
-from armloop.robot.levelling import say_other_gravity
+from armloop.robot.levelling import say_other_stance
 from armloop.util.errors import InputError
 
 CONTROLLERS = ("pid", "computed_torque")
@@ -68,7 +68,7 @@ class ControlledArm:
         """
         if isinstance(model, ReconstructedModel):
             model.arm.require_same(self.plant.arm, "the model")
-            say_other_gravity(self.plant.effects.gravity(self.plant.arm), model.arm)
+            say_other_stance(self.plant.arm, self.plant.effects.gravity(self.plant.arm), model.arm)
         if isinstance(self.controller, PidController):
             self.reference.set_model(model, step)
         else:
@@ -117,7 +117,7 @@ def add_arm_with_controller(
     _check_controller(controller, gains, model, step)
     if isinstance(model, ReconstructedModel):
         model.arm.require_same(spec.arm, "the model")
-        say_other_gravity(realise(spec.arm, effects).gravity(spec.arm), model.arm)
+        say_other_stance(spec.arm, realise(spec.arm, effects).gravity(spec.arm), model.arm)
     reference = as_reference(reference)
     followed = reference.evaluate([0.0])[0].shape[1]
     if not len(gains.kp) == followed == n:

@@ -69,20 +69,38 @@ def refined(problem: PlainFits, down: Array) -> Direction:
 def _step(problem: PlainFits, down: Array) -> tuple[Array, Direction]:
     """By how much a direction is off (3,), and it with its errors."""
     across = np.linalg.svd(down[None])[2][1:]
-    under = problem.under(down)
-    table, rows, still = under.table, under.table.moving, np.zeros_like(under.table.motion.q)
-    theta, size = under.solved(table.tau, rows)
-    links = under.base.to_full(theta[: under.base.count])[: 10 * under.arm.n]
-    g = float(np.linalg.norm(under.arm.gravity))
-    torques = [joint_torques(under.arm, links, table.motion.q, still, still, g * axis) for axis in across]
-    X, y, _ = under.beside(np.stack(torques, axis=2)).table.weighed(table.tau, rows, size)
+
+    def slopes(under: PlainFits, links: Array) -> Array:
+        q, g = under.table.motion.q, float(np.linalg.norm(under.arm.gravity))
+        still = np.zeros_like(q)
+        return np.stack(
+            [joint_torques(under.arm, links, q, still, still, g * axis) for axis in across], axis=2
+        )
+
+    off, covariance = gauss_newton(problem.under(down), slopes)
+    return off @ across, Direction(down, across, covariance)
+
+
+def gauss_newton(problem: PlainFits, slopes: Callable[[PlainFits, Array], Array]) -> tuple[Array, Array]:
+    """By how much k quantities of the arm are off (k,), and their covariance (k, k) over blocks.
+
+    Args:
+        problem: the record, as of the arm with these quantities as they are.
+        slopes: torques (N, n, k) per unit of each quantity, of links with parameters (10 n,).
+    """
+    table, rows = problem.table, problem.table.moving
+    theta, size = problem.solved(table.tau, rows)
+    links = problem.base.to_full(theta[: problem.base.count])[: 10 * problem.arm.n]
+    own = slopes(problem, links)
+    X, y, _ = problem.beside(own).table.weighed(table.tau, rows, size)
     lengths = np.maximum(np.linalg.norm(X, axis=0), TINY)
     X = X / lengths
     inverse = np.linalg.inv(X.T @ X + RIDGE * np.eye(X.shape[1]))
     found = inverse @ (X.T @ y)
-    blocks = np.concatenate([table.blocks[own] for own in rows.T])
-    covariance = block_covariance(inverse, X * (y - X @ found)[:, None], blocks) / np.outer(lengths, lengths)
-    return (found / lengths)[-2:] @ across, Direction(down, across, covariance[-2:, -2:])
+    blocks = np.concatenate([table.blocks[moving] for moving in rows.T])
+    covariance = block_covariance(inverse, X * (y - X @ found)[:, None], blocks) / lengths[:, None] / lengths
+    k = own.shape[2]
+    return (found / lengths)[-k:], covariance[-k:, -k:]
 
 
 def nearby(times: Callable[[Array], float], first: Array) -> Array:

@@ -49,6 +49,11 @@ class Mounting:
     lean: Direction | None = None
     angle: float = 0.0
 
+    @property
+    def slight(self) -> bool:
+        """Whether the base only leans."""
+        return self.lean is not None
+
     def of(self, arm: Arm) -> Arm:
         """The arm under gravity along this direction."""
         return replace(arm, gravity=float(np.linalg.norm(arm.gravity)) * self.down)
@@ -92,7 +97,8 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
     if lean is not None and (found is None or times(lean.down) >= AS_GOOD * times(found)):
         angle = lean.beside(given)
         seen = angle > _LEVEL and lean.standardised(given) > _SEEN
-        return Mounting(lean.down, lean, angle) if seen and _earned(problem, plain, lean.down) else None
+        leaning = problem.under(lean.down).fit(ones, as_given)
+        return Mounting(lean.down, lean, angle) if seen and earned(problem, plain, leaning) else None
     return None if found is None else Mounting(found)
 
 
@@ -108,12 +114,11 @@ def _upright(found: Array, given: Array) -> Array:
     return np.asarray(np.cos(angle) * given + np.sin(angle) * aside / max(length, _NOT_AT_ALL))
 
 
-def _earned(problem: PlainFits, plain: Fit, down: Array) -> bool:
-    """Whether gravity along a direction (3,) explains more than laws that look like it."""
-    ones, as_given = np.ones(problem.arm.n), np.arange(problem.arm.n)
-    leaning, sprung = (fits.fit(ones, as_given) for fits in (problem.under(down), problem.sprung()))
-    each = sorted(plain.over(leaning, [j]) for j in range(problem.arm.n))
-    mean = plain.over(leaning)
-    physical = leaning.faults.sum() <= plain.faults.sum()
+def earned(problem: PlainFits, plain: Fit, other: Fit) -> bool:
+    """Whether the arm, taken to stand otherwise, explains more than laws that look like it."""
+    sprung = problem.sprung().fit(np.ones(problem.arm.n), np.arange(problem.arm.n))
+    each = sorted(plain.over(other, [j]) for j in range(problem.arm.n))
+    mean = plain.over(other)
+    physical = other.faults.sum() <= plain.faults.sum()
     better = mean > max(_BETTER, plain.over(sprung) ** _MORE)
     return bool(physical and better and each[0] > _WORST and min(each[-2:]) > SECOND)

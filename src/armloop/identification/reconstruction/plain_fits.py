@@ -112,10 +112,13 @@ class PlainFits:
 
     def under(self, down: Array) -> Self:
         """The same with gravity in another direction (3,), a unit vector in the base frame."""
-        arm = replace(self.arm, gravity=float(np.linalg.norm(STANDARD_GRAVITY)) * down)
-        base, table, dry = BaseParameters.of_arm(arm, rotors=True), self.table, self.base.count
-        friction = table.columns[:, :, dry:]
-        columns = np.concatenate([base.columns(arm, table.motion), friction], axis=2)
+        return self.as_of(replace(self.arm, gravity=float(np.linalg.norm(STANDARD_GRAVITY)) * down))
+
+    def as_of(self, arm: Arm) -> Self:
+        """The same record as that of another arm of as many joints."""
+        base, table = BaseParameters.of_arm(arm, rotors=True), self.table
+        beside = table.columns[:, :, self.base.count :]
+        columns = np.concatenate([base.columns(arm, table.motion), beside], axis=2)
         return replace(self, arm=arm, base=base, table=replace(table, columns=columns))
 
     def every(self, step: int) -> Self:

@@ -10,15 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from armloop.data.log import MotionLog, unchecked_log
 from armloop.identification.reconstruction.mounting import SECOND, Mounting, other_mounting
 from armloop.identification.reconstruction.plain_fits import AS_GOOD, GOOD, Fit, PlainFits
+from armloop.identification.reconstruction.zero_offsets import ZeroOffset, other_zero
 from armloop.robot.arm import Arm
-from armloop.robot.levelling import turning, vector
+from armloop.robot.levelling import of_another_zero, turning, vector
 from armloop.util.arrays import Array, Index
 
 #: Mean relative error below which a record is taken as it stands; of a joint that is met so well, better says nothing.
@@ -51,12 +52,14 @@ class Reading(NamedTuple):
         unit: that of angles, radians if empty.
         turned: joints whose q, v and tau count in the other direction.
         down: direction of gravity in the base frame, a unit vector; the arm's if empty.
+        zero: a joint's zero that is another than the URDF's.
     """
 
     order: Index
     unit: str = ""
     turned: tuple[int, ...] = ()
     down: tuple[float, ...] = ()
+    zero: ZeroOffset | None = None
 
     def of(self, log: MotionLog, arm: Arm) -> MotionLog:
         """The log as it would be, read so."""
@@ -78,6 +81,8 @@ class Reading(NamedTuple):
         """What is regressed of the record, read so; None where there is too little motion."""
         if self.down:
             return plain.under(np.array(self.down))
+        if self.zero is not None:
+            return plain.as_of(self.zero.of(plain.arm))
         if not self.unit:
             return plain.read(self.order, self.signs)
         # a law of friction that is met badly may be met better at other speeds, and says nothing of a unit
@@ -89,11 +94,11 @@ class Reading(NamedTuple):
         """Whether a record explained so, read so, is not meant as it stands; springs at its joints may explain as much."""
         if other.faults.sum() > plain.faults.sum() or other.relative.max() >= GOOD:
             return False
-        if self.turned or self.down:
+        if self.turned or self.down or self.zero:
             each = [plain.over(other, [j], _GOOD_ENOUGH) for j in range(len(self.order))]
             best, mean, worst = _SENSE
             better = max(each) > best and plain.over(other, least=_GOOD_ENOUGH) > mean and min(each) > worst
-            alone = bool(self.down) and min(sorted(each)[-2:]) < SECOND
+            alone = not self.turned and min(sorted(each)[-2:]) < SECOND
             return better and not alone and sprung.over(other) > 1
         return plain.over(other) > (_UNIT if self.unit else _ORDER)
 
@@ -112,6 +117,8 @@ class Reading(NamedTuple):
                 "the arm seems to be mounted otherwise than its URDF says: with gravity along "
                 f"{vector(self.down, 2)} of the base frame {better}; {turning(np.array(self.down))}"
             )
+        if self.zero is not None:
+            return f"{of_another_zero(self.zero.joint + 1, self.zero.angle)} {better}"
         if self.turned:
             return (
                 f"{self.which()} in the direction against the URDF's axis: with q, v and tau of the other sign {better}; "
@@ -152,15 +159,15 @@ def _orders(n: int) -> Iterator[tuple[int, ...]]:
 
 def meant(
     problem: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float, plain: Fit
-) -> tuple[str, Mounting | None]:
-    """What is wrong with a record that another reading explains far better, the simplest of the best; or how its base leans.
+) -> tuple[str, Mounting | ZeroOffset | None]:
+    """What is wrong with a record that another reading explains far better, the simplest of the best; or is slightly off.
 
     Args:
         problem: what is regressed of the record as it stands.
         plain: what is left of it.
 
     Returns:
-        Empty words if no reading does; and a base that leans, if that explains most.
+        Empty words if no reading does; and how the base leans, or a joint's zero is off, if that explains most.
     """
     if float(np.mean(plain.relative)) < _GOOD_ENOUGH:
         return "", None
@@ -169,10 +176,9 @@ def meant(
     few = problem.every(_SCREENED)
     first = few.fit(np.ones(n), np.arange(n))
     sprung = problem.sprung().fit(np.ones(n), np.arange(n))
-    mounting = other_mounting(problem, plain)
-    leans = mounting is not None and mounting.lean is not None
-    mounted = [] if mounting is None else [Reading(np.arange(n), down=tuple(mounting.down.tolist()))]
-    for reading in (*mounted, *readings(problem.arm)):
+    stances = [other for other in (other_mounting(problem, plain), other_zero(problem, plain)) if other]
+    stood = [Reading(np.arange(n), **_as_read(other)) for other in stances]
+    for reading in (*stood, *readings(problem.arm)):
         if reading.turned:
             quick = few.read(reading.order, reading.signs).fit(np.ones(n), np.arange(n))
             if first.over(quick) < _PROMISING:
@@ -181,15 +187,22 @@ def meant(
         if read is None:
             continue
         other = read.fit(np.ones(n), np.arange(n))
-        if (reading.down and leans) or reading.far_better(plain, other, sprung):
+        slight = any(reading is own and stance.slight for own, stance in zip(stood, stances, strict=True))
+        if slight or reading.far_better(plain, other, sprung):
             found.append((reading, plain.over(other)))
     best = max((times for _, times in found), default=0.0)
     near = sorted((pair for pair in found if pair[1] >= AS_GOOD * best), key=lambda pair: len(pair[0].turned))
     if not near:
         return "", None
     reading, times = near[0]
-    if reading.down and leans:
-        return "", mounting
+    for own, stance in zip(stood, stances, strict=True):
+        if reading is own and stance.slight:
+            return "", stance
     # an arm that hangs is its own mirror image, whose joints turn the other way
     others = [f"; or {other.which()} against the URDF's axes" for other, _ in near if other.turned]
     return reading.words(times) + "".join(others[:1] if reading.down else []), None
+
+
+def _as_read(stance: Mounting | ZeroOffset) -> dict[str, Any]:
+    """How a reading has it that the arm stands otherwise."""
+    return {"zero": stance} if isinstance(stance, ZeroOffset) else {"down": tuple(stance.down.tolist())}

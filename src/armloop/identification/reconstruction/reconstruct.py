@@ -32,6 +32,7 @@ from armloop.identification.reconstruction.libraries import (
     named,
 )
 from armloop.identification.reconstruction.library import METHODS, REFERENCE, Library
+from armloop.identification.reconstruction.mounting import Mounting
 from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.identification.reconstruction.preparation import Prepared, prepared
 from armloop.identification.reconstruction.ripple import find_ripple
@@ -39,6 +40,7 @@ from armloop.identification.reconstruction.ripple import notes as ripple_notes
 from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
 from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.identification.reconstruction.zero_offsets import ZeroOffset
 from armloop.identification.scoring import Score, residual
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
@@ -175,10 +177,11 @@ def reconstruct(
         prepared, logs, kept, usual=usual, given=conditioning, options=settings, progress=progress
     )
     ready = preparing(arm=arm, corrected=method != REFERENCE)
-    leaning = check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz)
-    if leaning is not None:
-        progress("the base leans: anew under gravity as it is")
-        arm = leaning.of(arm)
+    stances = check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz)
+    if stances:
+        progress("the arm stands slightly otherwise than its URDF says: anew as it stands")
+        for stance in stances:
+            arm = stance.of(arm)
         ready = preparing(arm=arm, corrected=method != REFERENCE)
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
@@ -193,14 +196,20 @@ def reconstruct(
         found = library.methods[method](arm, data, ready.options, progress)
         found.history |= ready.history()
         found.notes += ready.notes(arm, how)
-        if leaning is not None:
-            found.history["leaning"] = leaning.to_dict()
-            found.notes.append(leaning.note())
+        found.history |= stance_history(stances)
+        found.notes += [stance.note() for stance in stances]
         return Attempt(library, how, data, found, ready.blocks.margin)
 
     refused = {} if library is not None else _refused(arm, wanted, ready)
     tried, part = _compared(wanted, refused, attempt, ready)
     return _finished(tried, part, method, ready, progress, recorded)
+
+
+def stance_history(stances: Sequence[Mounting | ZeroOffset]) -> dict[str, Any]:
+    """What a model's history holds of how the arm stands."""
+    zeros = [stance.to_dict() for stance in stances if isinstance(stance, ZeroOffset)]
+    leaning = [stance.to_dict() for stance in stances if isinstance(stance, Mounting)]
+    return {**({"leaning": leaning[-1]} if leaning else {}), **({"zeros": zeros} if zeros else {})}
 
 
 def _refused(arm: Arm, wanted: Sequence[Library], ready: Prepared) -> dict[Library, str]:

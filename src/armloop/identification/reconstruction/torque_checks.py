@@ -23,6 +23,7 @@ from armloop.identification.reconstruction.mounting import Mounting
 from armloop.identification.reconstruction.plain_fits import FAR, GOOD, Fit, PlainFits
 from armloop.identification.reconstruction.readings import meant
 from armloop.identification.reconstruction.systematic_sample import even_selection
+from armloop.identification.reconstruction.zero_offsets import ZeroOffset
 from armloop.robot.arm import Arm
 from armloop.util.errors import LogError
 
@@ -32,16 +33,22 @@ _DRIVES = 0.5
 _BETTER = 2.0
 #: In two halves of the data a gain that is far off must be the same but for this factor.
 _ALIKE = 1.5
+#: So many ways of standing slightly otherwise are looked for.
+_MOST = 4
 
 
-def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> Mounting | None:
-    """How the base leans, if it does; raises `LogError`, with the likely cause, of torques that cannot be this arm's."""
+def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> list[Mounting | ZeroOffset]:
+    """By what the arm stands slightly otherwise than its URDF says: how its base leans, and which joints' zeros are off.
+
+    Raises:
+        LogError: the torques cannot be this arm's; with the likely cause.
+    """
     chosen = even_selection(logs)
     if cutoff_hz <= 0 or not all(is_time_series(log.q, log.runs()) for log in chosen):
-        return None
+        return []
     problem = Problem.of(chosen, arm, cutoff_hz)
     if problem is None:
-        return None
+        return []
     named = list(dict.fromkeys(log.name for log in chosen))
     names = ", ".join(named[:3]) + (", ..." if len(named) > 3 else "")
     plain = problem.fit(np.ones(arm.n), np.arange(arm.n))
@@ -62,10 +69,17 @@ def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> Moun
             f"{names}: the torques do not fit one another: tau{j + 1} is about {float(f'{1 / factor:.2g}'):g} times what "
             "the links give that explain the other joints; check the units and drive gains of all joints"
         )
-    wrong, leaning = meant(problem, chosen, cutoff_hz, plain)
-    if wrong:
-        raise LogError(f"{names}: {wrong}")
-    return leaning
+    found: list[Mounting | ZeroOffset] = []
+    while len(found) < _MOST:
+        wrong, stance = meant(problem, chosen, cutoff_hz, plain)
+        if wrong:
+            raise LogError(f"{names}: {wrong}")
+        if stance is None:
+            break
+        found.append(stance)
+        problem = problem.as_of(stance.of(problem.arm))
+        plain = problem.fit(np.ones(arm.n), np.arange(arm.n))
+    return found
 
 
 class Problem(PlainFits):

@@ -1,0 +1,98 @@
+"""Zeros of the joints: whether one is further than its position says, by a little or by a quarter turn.
+
+An encoder that was mastered wrongly, or a maker whose zero is not that of the URDF: what hangs on the joint is then loaded
+from another side than its positions say. Of the last joint nothing tells, nor of an upright first one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from armloop.identification.reconstruction.gravity_direction import gauss_newton
+from armloop.identification.reconstruction.mounting import earned
+from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
+from armloop.robot.arm import Arm
+from armloop.robot.levelling import of_a_zero
+from armloop.robot.newton_euler import joint_torques
+from armloop.util.arrays import Array
+
+#: Other zeros that are tried, rad; from one the search goes on where it explains all torques so many times as well.
+_STARTS, _ANY = (np.pi / 2, -np.pi / 2, np.pi), 1.1
+#: Gauss-Newton steps: how many, none longer than this, until they are so short, rad.
+_STEPS, _LONGEST, _SHORT = 6, 0.4, 1e-5
+#: A zero is off by more than this, and by so many standard errors; from the next on it is another one, rad.
+_EXACT, _SEEN, OTHER = 0.01, 5.0, 0.35
+#: Of the difference that a slope is made of, rad.
+_STEP = 1e-4
+
+
+@dataclass(frozen=True)
+class ZeroOffset:
+    """A joint (0-based) that is further by an angle than its position says, with its standard error, rad."""
+
+    joint: int
+    angle: float
+    std_error: float
+
+    @property
+    def slight(self) -> bool:
+        """Whether it is the URDF's zero, a little off."""
+        return abs(self.angle) < OTHER
+
+    def of(self, arm: Arm) -> Arm:
+        """The arm with this zero."""
+        return arm.with_zero(self.joint, self.angle)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a model of the arm keeps of it, the joint from 1."""
+        return {"joint": self.joint + 1, "angle": self.angle, "std_error": self.std_error}
+
+    def note(self) -> str:
+        """What was found, and what is done about it."""
+        return of_a_zero(**self.to_dict())
+
+
+def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
+    """The joint's zero, another than the URDF's, that explains all torques best, if it explains them better by far.
+
+    Args:
+        problem: what is regressed of the record as it stands.
+        plain: what is left of it.
+    """
+    n = problem.arm.n
+
+    def fit(joint: int, angle: float) -> Fit:
+        return problem.as_of(problem.arm.with_zero(joint, angle)).fit(np.ones(n), np.arange(n))
+
+    tried: list[tuple[float, ZeroOffset]] = []
+    for joint in np.flatnonzero(problem.arm.revolute)[: n - 1 if problem.arm.revolute[-1] else None].tolist():
+        times = {start: plain.over(fit(joint, start)) for start in _STARTS}
+        far = max(_STARTS, key=lambda start: times[start])
+        for start in (0.0, *([far] if times[far] > _ANY else [])):
+            offset = _refined(problem, joint, start)
+            seen = abs(offset.angle) > max(_EXACT, _SEEN * offset.std_error)
+            if seen and earned(problem, plain, fit(joint, offset.angle)):
+                tried.append((plain.over(fit(joint, offset.angle)), offset))
+    return max(tried, key=lambda one: one[0])[1] if tried else None
+
+
+def _refined(problem: PlainFits, joint: int, angle: float) -> ZeroOffset:
+    """The zero near an angle that explains most, by Gauss-Newton steps."""
+
+    def slopes(of: PlainFits, links: Array) -> Array:
+        m = of.table.motion
+        there, back = (
+            joint_torques(of.arm.with_zero(joint, h), links, m.q, m.v, m.vdot) for h in (_STEP, -_STEP)
+        )
+        return np.asarray((there - back)[:, :, None] / (2 * _STEP))
+
+    for _ in range(_STEPS):
+        off, covariance = gauss_newton(problem.as_of(problem.arm.with_zero(joint, angle)), slopes)
+        step = float(np.clip(off[0], -_LONGEST, _LONGEST))
+        angle += step
+        if abs(step) < _SHORT:
+            break
+    return ZeroOffset(joint, float((angle + np.pi) % (2 * np.pi) - np.pi), float(np.sqrt(covariance[0, 0])))

@@ -1,0 +1,89 @@
+"""Joints that are further than their positions say: by a little, which the model takes in, or by a quarter turn."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, rigid_torque
+from synthetic import measured as recorded
+
+from armloop.data.log import MotionLog, read_log
+from armloop.data.signals import preprocess
+from armloop.identification.reconstruction import reconstruct
+from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.identification.reconstruction.zero_offsets import ZeroOffset
+from armloop.identification.scoring import score
+from armloop.model import load_model
+from armloop.robot.arm import Arm, load_arm
+from armloop.util.errors import LogError
+
+
+def six_axes(folder: Path) -> Arm:
+    """An arm of an upright first axis, shoulder, elbow and a wrist of three, none of whose links lies on its axis."""
+    place = [(0, 0, 0.2), (0.05, 0, 0.1), (0, 0, 0.4), (0, 0.02, 0.1), (0, 0, 0.3), (0, 0, 0.1)]
+    axis = ["0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "0 0 1"]
+    text = '<robot name="six"><link name="l0"/>'
+    for k in range(6):
+        m, c = 6.0 / (k + 1), 0.03 * (k + 1)
+        text += (
+            f'<link name="l{k + 1}"><inertial><origin xyz="{0.02 + c / 4} {0.01 + c / 6} {0.05 + c / 2}"/>'
+            f'<mass value="{m}"/>'
+            f'<inertia ixx="{0.02 * m}" iyy="{0.025 * m}" izz="{0.01 * m}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="j{k + 1}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/>'
+            f'<origin xyz="{place[k][0]} {place[k][1]} {place[k][2]}"/><axis xyz="{axis[k]}"/>'
+            '<limit lower="-3" upper="3" velocity="5" effort="200"/></joint>'
+        )
+    (folder / "six.urdf").write_text(text + "</robot>")
+    return load_arm(folder / "six.urdf")
+
+
+def a_run(arm: Arm, seed: int, seconds: float = 60.0) -> MotionLog:
+    motion = fourier_motion(seconds, 100.0, seed, arm)
+    tau = rigid_torque(arm, motion.q, motion.v, motion.vdot)
+    size = np.sqrt(np.mean(tau**2, axis=0))
+    return recorded(motion, tau + size * (0.1 * np.sign(motion.v) + 0.1 * motion.v), seed, name=f"run_{seed}")
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_zero_that_is_slightly_off_is_found_within_its_errors(seed: int, tmp_path: Path) -> None:
+    arm = six_axes(tmp_path)
+    assert check_torques([a_run(arm, seed)], arm, 10.0) == []
+    for joint, angle in ((1, 0.08), (2, -0.15)):
+        (found,) = check_torques([a_run(arm.with_zero(joint, angle), seed)], arm, 10.0)
+        assert isinstance(found, ZeroOffset) and found.joint == joint
+        assert abs(found.angle - angle) < 5 * found.std_error < 0.02
+
+
+def test_a_quarter_turn_is_another_zero(tmp_path: Path) -> None:
+    arm = six_axes(tmp_path)
+    for joint, angle, words in ((1, np.pi / 2, r"q2 \+ 1\.57"), (2, -np.pi / 2, r"q3 - 1\.57")):
+        with pytest.raises(
+            LogError, match=f"joint {joint + 1} counts from another zero than the URDF's; give {words}"
+        ):
+            check_torques([a_run(arm.with_zero(joint, angle), 1)], arm, 10.0)
+
+
+def test_a_model_of_an_arm_whose_zero_is_off_has_it(tmp_path: Path) -> None:
+    arm = six_axes(tmp_path)
+    real = arm.with_zero(1, 0.08)
+    found = reconstruct([a_run(real, seed) for seed in (1, 2)], arm, library="rigid-body")
+    (said,) = [note for note in found.notes if note.startswith("joint 2 is 0.0")]
+    assert "further than q2 says by the URDF's zero, and the model takes it so; give q2 + 0.0" in said
+    found.model.save(tmp_path / "model.json")
+    kept = load_model(tmp_path / "model.json", arm)
+    assert kept.arm.zeros[1] == pytest.approx(0.08, abs=0.005)
+    assert kept.history["zeros"][0]["joint"] == 2
+    fresh = preprocess([a_run(real, 3)], kept.conditioning)
+    assert max(score(kept, fresh).moving["nrmse"]) < 0.03
+
+
+@pytest.mark.measured
+def test_measured_arms_have_the_urdfs_zeros_but_where_that_is_turned(measured: Path) -> None:
+    arm = load_arm(measured / "panda" / "panda.urdf")
+    log = read_log(measured / "panda" / "exciting_1a.csv", quiet=True)
+    for joint in (1, 4):
+        (found,) = check_torques([log], arm.with_zero(joint, -0.1), 8.0)
+        assert isinstance(found, ZeroOffset) and found.joint == joint
+        assert found.angle == pytest.approx(0.1, abs=0.01)
+    with pytest.raises(LogError, match=r"joint 2 counts from another zero .* give q2 \+ 1\.57"):
+        check_torques([log], arm.with_zero(1, -np.pi / 2), 8.0)
