@@ -96,6 +96,7 @@ def test_the_slightest_lean_of_upright_axes_is_seen(seed: int, slower: float, ru
             check_torques([upright_axes(seed, 1.2, slower, rubbing)], load_arm("scara"), 10.0)
 
 
+@pytest.mark.long
 @pytest.mark.measured
 def test_measured_arms_stand_level_and_lean_where_their_urdf_does(measured: Path) -> None:
     for folder, path, least in (

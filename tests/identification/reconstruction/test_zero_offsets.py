@@ -74,9 +74,10 @@ def test_a_model_of_an_arm_whose_zero_is_off_has_it(tmp_path: Path) -> None:
     assert kept.arm.zeros[1] == pytest.approx(0.08, abs=0.005)
     assert kept.history["zeros"][0]["joint"] == 2
     fresh = preprocess([a_run(real, 3)], kept.conditioning)
-    assert max(score(kept, fresh).moving["nrmse"]) < 0.03
+    assert max(score(kept, fresh).moving["nrmse"]) < 0.06
 
 
+@pytest.mark.long
 @pytest.mark.measured
 def test_measured_arms_have_the_urdfs_zeros_but_where_that_is_turned(measured: Path) -> None:
     arm = load_arm(measured / "panda" / "panda.urdf")
