@@ -44,9 +44,9 @@ class Direction:
         return float(np.arctan2(np.linalg.norm(np.cross(self.down, other)), self.down @ other))
 
     def standardised(self, other: Array) -> float:
-        """The angle to another direction near this one in standard deviations."""
+        """The angle to another direction near this one in standard deviations; of a side that nothing shows, none."""
         off = self.across @ (other - self.down)
-        return float(np.sqrt(off @ np.linalg.solve(self.covariance, off)))
+        return float(np.sqrt(off @ np.linalg.pinv(self.covariance) @ off))
 
     @property
     def std_error(self) -> float:

@@ -68,7 +68,7 @@ def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
         return problem.as_of(problem.arm.with_zero(joint, angle)).fit(np.ones(n), np.arange(n))
 
     tried: list[tuple[float, ZeroOffset]] = []
-    for joint in np.flatnonzero(problem.arm.revolute)[: n - 1 if problem.arm.revolute[-1] else None].tolist():
+    for joint in np.flatnonzero(problem.arm.revolute[: n - 1]).tolist():
         times = {start: plain.over(fit(joint, start)) for start in _STARTS}
         far = max(_STARTS, key=lambda start: times[start])
         for start in (0.0, *([far] if times[far] > _ANY else [])):
