@@ -222,6 +222,9 @@ class Given:
     def fit(self, signs: Array, order: Index) -> Fit:
         return self.plain
 
+    def left(self) -> Fit:
+        return self.plain
+
     def sprung(self) -> Any:
         return self._left("springs") or self._left("plain")
 
@@ -230,7 +233,7 @@ class Given:
 
     def _left(self, reading: str) -> Any:
         fit = self.plain if reading == "plain" else self.others.get(reading)
-        return None if fit is None else SimpleNamespace(fit=lambda signs, order: fit)
+        return None if fit is None else SimpleNamespace(fit=lambda signs, order: fit, left=lambda: fit)
 
 
 def chosen(plain: Fit, others: dict[str, Fit], monkeypatch: pytest.MonkeyPatch) -> str:

@@ -13,7 +13,13 @@ from typing import Any
 import numpy as np
 
 from armloop.identification.reconstruction.gravity_direction import Direction, nearby, refined
-from armloop.identification.reconstruction.plain_fits import AS_GOOD, Fit, PlainFits
+from armloop.identification.reconstruction.plain_fits import (
+    AS_GOOD,
+    PROMISING,
+    SCREENED,
+    Fit,
+    PlainFits,
+)
 from armloop.robot.arm import Arm
 from armloop.robot.levelling import of_a_lean
 from armloop.util.arrays import Array
@@ -77,23 +83,31 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
         plain: what is left of it.
     """
 
-    def times(down: Array) -> float:
-        return plain.over(problem.under(down).fit(ones, as_given))
-
     ones, as_given = np.ones(problem.arm.n), np.arange(problem.arm.n)
+    few = problem.every(SCREENED)
+    first = few.left()
+
+    def quickly(down: Array) -> float:
+        return first.over(few.under(down).left())
+
+    def times(down: Array) -> float:
+        return plain.over(problem.under(down).left())
+
     g = float(np.linalg.norm(problem.arm.gravity))
     given = problem.arm.gravity / g if g else None
-    best = max(_DIRECTIONS, key=times)
-    found = nearby(times, best) if times(best) > _ANY else None
+    best = max(_DIRECTIONS, key=quickly)
+    found = nearby(times, best) if quickly(best) > _ANY else None
     if given is None:
         return None if found is None else Mounting(found)
-    leans = [refined(problem, given)]
+    leans = [refined(few, given).down]
     if found is not None:
-        first = _upright(found, given)
-        near = nearby(lambda down: times(down) if down @ given > np.cos(_LEANS) else _NOT_AT_ALL, first)
-        leans.append(refined(problem, near))
-    leans = [one for one in leans if one.beside(given) < _LEANS]
-    lean = max(leans, key=lambda one: times(one.down), default=None)
+        upright = _upright(found, given)
+        leans.append(
+            nearby(lambda down: quickly(down) if down @ given > np.cos(_LEANS) else _NOT_AT_ALL, upright)
+        )
+    near = [refined(problem, lean) for lean in leans if quickly(lean) > PROMISING]
+    near = [one for one in near if one.beside(given) < _LEANS]
+    lean = max(near, key=lambda one: times(one.down), default=None)
     if lean is not None and (found is None or times(lean.down) >= AS_GOOD * times(found)):
         angle = lean.beside(given)
         seen = angle > _LEVEL and lean.standardised(given) > _SEEN

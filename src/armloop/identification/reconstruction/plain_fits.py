@@ -37,6 +37,8 @@ _EVERY = 3
 _EXACT = 1e-9
 #: What explains a joint, in its place or unit, leaves a relative error below this; a gain is far off from this factor on.
 GOOD, FAR = 0.6, 3.0
+#: Readings are many: of every so manieth instant each must first explain so many times as much.
+SCREENED, PROMISING = 3, 1.1
 #: Readings of a record that explain nearly this part as much as the best are as good, and the simplest is meant.
 AS_GOOD = 0.95
 
@@ -143,6 +145,13 @@ class PlainFits:
             theta = determined_solution(X, y)
             error = table.sizes(tau - table.columns @ theta, rows)
         return theta, error
+
+    def left(self) -> Fit:
+        """The relative errors alone, of the record as it stands: power and inertia are taken to be as they must."""
+        table = self.table
+        _, error = self.solved(table.tau, table.moving)
+        scale = np.maximum(table.sizes(table.tau, table.moving), LEAST)
+        return Fit(error / scale, np.ones(len(scale)), np.ones(len(scale)))
 
     def fit(self, signs: Array, order: Index, half: int | None = None) -> Fit:
         """Regress the torques with these signs in this order, of all blocks or of every other one."""

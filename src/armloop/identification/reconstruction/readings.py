@@ -16,7 +16,14 @@ import numpy as np
 
 from armloop.data.log import MotionLog, unchecked_log
 from armloop.identification.reconstruction.mounting import SECOND, Mounting, other_mounting
-from armloop.identification.reconstruction.plain_fits import AS_GOOD, GOOD, Fit, PlainFits
+from armloop.identification.reconstruction.plain_fits import (
+    AS_GOOD,
+    GOOD,
+    PROMISING,
+    SCREENED,
+    Fit,
+    PlainFits,
+)
 from armloop.identification.reconstruction.zero_offsets import ZeroOffset, other_zero
 from armloop.robot.arm import Arm
 from armloop.robot.levelling import of_another_zero, turning, vector
@@ -34,8 +41,6 @@ _ORDER, _UNIT = 3.0, 1.5
 #: nothing. Measured arms that were read rightly came to 1.04, 1.00 and 0.98; with laws of another kind, as strong as
 #: gravity, simulated ones to 1.5, 1.1 and 0.7.
 _SENSE = (2.0, 1.2, 0.8)
-#: Sets of joints are many: of every so manieth instant each must first explain so many times as much.
-_SCREENED, _PROMISING = 3, 1.1
 #: Arms of so many joints are tried with every set of them counting the other way; larger ones with any one or two.
 _EVERY_SENSE = 7
 #: Arms of so many joints are tried in every order; larger ones with any two in exchange, turned round and moved on by one.
@@ -173,15 +178,14 @@ def meant(
         return "", None
     n = len(plain.relative)
     found: list[tuple[Reading, float]] = []
-    few = problem.every(_SCREENED)
-    first = few.fit(np.ones(n), np.arange(n))
+    few = problem.every(SCREENED)
+    first = few.left()
     sprung = problem.sprung().fit(np.ones(n), np.arange(n))
     stances = [other for other in (other_mounting(problem, plain), other_zero(problem, plain)) if other]
     stood = [Reading(np.arange(n), **_as_read(other)) for other in stances]
     for reading in (*stood, *readings(problem.arm)):
         if reading.turned:
-            quick = few.read(reading.order, reading.signs).fit(np.ones(n), np.arange(n))
-            if first.over(quick) < _PROMISING:
+            if first.over(few.read(reading.order, reading.signs).left()) < PROMISING:
                 continue
         read = reading.problem(problem, logs, cutoff_hz)
         if read is None:

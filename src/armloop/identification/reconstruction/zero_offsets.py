@@ -13,14 +13,14 @@ import numpy as np
 
 from armloop.identification.reconstruction.gravity_direction import gauss_newton
 from armloop.identification.reconstruction.mounting import earned
-from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
+from armloop.identification.reconstruction.plain_fits import PROMISING, SCREENED, Fit, PlainFits
 from armloop.robot.arm import Arm
 from armloop.robot.levelling import of_a_zero
 from armloop.robot.newton_euler import joint_torques
 from armloop.util.arrays import Array
 
-#: Other zeros that are tried, rad; from one the search goes on where it explains all torques so many times as well.
-_STARTS, _ANY = (np.pi / 2, -np.pi / 2, np.pi), 1.1
+#: Other zeros that are tried, rad.
+_STARTS = (np.pi / 2, -np.pi / 2, np.pi)
 #: Gauss-Newton steps: how many, none longer than this, until they are so short, rad.
 _STEPS, _LONGEST, _SHORT = 6, 0.4, 1e-5
 #: A zero is off by more than this, and by so many standard errors; from the next on it is another one, rad.
@@ -63,19 +63,24 @@ def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
         plain: what is left of it.
     """
     n = problem.arm.n
+    few = problem.every(SCREENED)
+    first = few.left()
 
-    def fit(joint: int, angle: float) -> Fit:
-        return problem.as_of(problem.arm.with_zero(joint, angle)).fit(np.ones(n), np.arange(n))
+    def quickly(joint: int, angle: float) -> float:
+        return first.over(few.as_of(few.arm.with_zero(joint, angle)).left())
 
     tried: list[tuple[float, ZeroOffset]] = []
     for joint in np.flatnonzero(problem.arm.revolute[: n - 1]).tolist():
-        times = {start: plain.over(fit(joint, start)) for start in _STARTS}
-        far = max(_STARTS, key=lambda start: times[start])
-        for start in (0.0, *([far] if times[far] > _ANY else [])):
-            offset = _refined(problem, joint, start)
+        starts = [0.0, max(_STARTS, key=lambda start: quickly(joint, start))]
+        for start in starts if quickly(joint, starts[1]) > PROMISING else starts[:1]:
+            offset = _refined(few, joint, start)
+            if abs(offset.angle) < _EXACT or quickly(joint, offset.angle) < PROMISING:
+                continue
+            offset = _refined(problem, joint, offset.angle)
+            other = problem.as_of(offset.of(problem.arm)).fit(np.ones(n), np.arange(n))
             seen = abs(offset.angle) > max(_EXACT, _SEEN * offset.std_error)
-            if seen and earned(problem, plain, fit(joint, offset.angle)):
-                tried.append((plain.over(fit(joint, offset.angle)), offset))
+            if seen and earned(problem, plain, other):
+                tried.append((plain.over(other), offset))
     return max(tried, key=lambda one: one[0])[1] if tried else None
 
 
