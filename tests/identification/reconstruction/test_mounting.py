@@ -1,6 +1,8 @@
 """A base that leans is found by the torques, and the model takes gravity as it is."""
 
+import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from synthetic import measured as recorded
 from armloop.api.model import load_model as api_load
 from armloop.data.log import MotionLog, read_log
 from armloop.data.signals import preprocess
-from armloop.identification.reconstruction import reconstruct
+from armloop.identification.reconstruction import Options, reconstruct
 from armloop.identification.reconstruction.gravity_direction import Direction
 from armloop.identification.reconstruction.mounting import Mounting
 from armloop.identification.reconstruction.torque_checks import check_torques
@@ -127,6 +129,42 @@ def test_a_model_of_an_arm_that_leans_has_gravity_as_it_is(library: str, tmp_pat
     assert said in str(api_load(tmp_path / "model.json"))
     other = preprocess([three_axes(3, leaning, 0.3)], kept.conditioning)
     assert max(score(kept, other).moving["nrmse"]) < 0.02
+
+
+def test_what_is_held_out_says_nothing_of_how_the_arm_stands() -> None:
+    leaning = turned_by(three_axis(), 6.0, (0, 1, 0))
+    log, aside = three_axes(1, leaning, 0.3), [np.array([[8.0, 20.0], [30.0, 33.0]])]
+    hidden = (log.time > 8.3) & (log.time < 19.7) | (log.time > 30.3) & (log.time < 32.7)
+    spoilt = replace(log, tau=np.where(hidden[:, None], 0.2 * log.tau, log.tau))
+    (seen,), (same,) = (check_torques([one], three_axis(), 10.0, aside) for one in (log, spoilt))
+    np.testing.assert_allclose(same.of(three_axis()).gravity, seen.of(three_axis()).gravity, atol=1e-3)
+    # with them it would be another
+    other = check_torques([spoilt], three_axis(), 10.0)
+    assert not other or not np.allclose(other[0].of(three_axis()).gravity, leaning.gravity, atol=0.1)
+    # and where nothing else is left, nothing is said
+    assert check_torques([log], three_axis(), 10.0, [np.array([[0.0, 39.0]])]) == []
+
+
+def test_a_model_is_reconstructed_on_what_stands_aside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How the arm stands is found twice, from the URDF's arm, each time without the blocks that are held out then."""
+    leaning = turned_by(three_axis(), 6.0, (0, 1, 0))
+    asked: list[tuple[Arm, list[Any]]] = []
+
+    def spied(logs: Any, arm: Arm, cutoff_hz: float, aside: Any) -> Any:
+        asked.append((arm, list(aside)))
+        return check_torques(logs, arm, cutoff_hz, aside)
+
+    monkeypatch.setattr(sys.modules[reconstruct.__module__], "check_torques", spied)
+    options = Options(parts=False, standard_errors=False)
+    reconstruct(
+        [three_axes(seed, leaning, 0.3) for seed in (1, 2)],
+        three_axis(),
+        library="rigid-body",
+        options=options,
+    )
+    assert len(asked) == 2
+    for arm, aside in asked:
+        assert arm is three_axis() and len(aside) == 2 and all(len(intervals) for intervals in aside)
 
 
 def test_angles_of_a_direction_and_their_errors() -> None:

@@ -127,12 +127,12 @@ class TestWhole:
                 return asked["scaled"]
 
             @staticmethod
-            def of(logs: Any, arm: Any, cutoff_hz: float) -> Any:
+            def of(logs: Any, arm: Any, cutoff_hz: float, aside: Any = None) -> Any:
                 asked["problems"] += 1
                 return Given() if asked["given"] else None
 
         monkeypatch.setattr(torque_checks, "Problem", Given)
-        monkeypatch.setattr(torque_checks, "even_selection", lambda logs: logs)
+        monkeypatch.setattr(torque_checks, "placed_runs", lambda logs: list(enumerate(logs)))
         monkeypatch.setattr(torque_checks, "is_time_series", lambda q, runs: q)
         monkeypatch.setattr(torque_checks, "meant", lambda *_: ("", None))
         return asked

@@ -82,7 +82,6 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
         problem: what is regressed of the record as it stands.
         plain: what is left of it.
     """
-
     ones, as_given = np.ones(problem.arm.n), np.arange(problem.arm.n)
     few = problem.every(SCREENED)
     first = few.left()

@@ -83,11 +83,21 @@ class PlainFits:
 
     @classmethod
     def of(
-        cls, logs: Sequence[MotionLog], arm: Arm, cutoff_hz: float, unit: Array | float = 1.0
+        cls,
+        logs: Sequence[MotionLog],
+        arm: Arm,
+        cutoff_hz: float,
+        unit: Array | float = 1.0,
+        aside: Sequence[Array] | None = None,
     ) -> Self | None:
-        """None where there is too little motion to judge; positions are in a unit (n,) of rad (m)."""
+        """None where there is too little motion to judge.
+
+        Args:
+            unit: (n,) that of the positions, in rad (m).
+            aside: per log, (B, 2) intervals that take no part.
+        """
         base = BaseParameters.of_arm(arm, rotors=True)
-        table = table_at(list(logs), arm, base, Conditioning(), cutoff_hz, [cutoff_hz], unit=unit)
+        table = table_at(list(logs), arm, base, Conditioning(), cutoff_hz, [cutoff_hz], aside, unit)
         if table is None or (table.moving.sum(axis=0) < _FEWEST).any():
             return None
         q = np.concatenate([log.q for log in logs])

@@ -16,6 +16,7 @@ from armloop.identification.reconstruction.held_out import held_out_intervals
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.torque_lag import TorqueLag, torque_lag
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress
 
 
@@ -30,6 +31,7 @@ class Prepared:
         given: the filter, where the caller has said which.
         lag: where the torque is out of step with the motion.
         zeros: where the encoders of several logs were compared.
+        aside: per log, (B, 2) instants, s, between which a block is held out.
     """
 
     logs: Sequence[LogSource]
@@ -40,6 +42,7 @@ class Prepared:
     blocks: Blocks
     lag: TorqueLag | None
     zeros: EncoderZeros | None
+    aside: Sequence[Array]
 
     @property
     def runs(self) -> Sequence[LogSource]:
@@ -123,7 +126,7 @@ def prepared(
     if kept and bandwidth.cutoff_hz > 0 and corrected:
         zeros = encoder_zeros(kept, arm, bandwidth.cutoff_hz, aside, blocks.correlation)
         logs = kept = zeros.corrected(kept)
-    return Prepared(logs, kept, dealt, given, bandwidth, blocks, late, zeros)
+    return Prepared(logs, kept, dealt, given, bandwidth, blocks, late, zeros, aside)
 
 
 def _filter_and_blocks(

@@ -177,12 +177,13 @@ def reconstruct(
         prepared, logs, kept, usual=usual, given=conditioning, options=settings, progress=progress
     )
     ready = preparing(arm=arm, corrected=method != REFERENCE)
-    stances = check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz)
+    stances = check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz, ready.aside)
     if stances:
         progress("the arm stands slightly otherwise than its URDF says: anew as it stands")
-        for stance in stances:
-            arm = stance.of(arm)
-        ready = preparing(arm=arm, corrected=method != REFERENCE)
+        ready = preparing(arm=as_it_stands(arm, stances), corrected=method != REFERENCE)
+        # other blocks may be held out now
+        stances = check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz, ready.aside)
+        arm = as_it_stands(arm, stances)
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
         how = ready.conditioning(library.conditioning)
@@ -203,6 +204,13 @@ def reconstruct(
     refused = {} if library is not None else _refused(arm, wanted, ready)
     tried, part = _compared(wanted, refused, attempt, ready)
     return _finished(tried, part, method, ready, progress, recorded)
+
+
+def as_it_stands(arm: Arm, stances: Sequence[Mounting | ZeroOffset]) -> Arm:
+    """The arm that stands otherwise than its URDF says in so many ways."""
+    for stance in stances:
+        arm = stance.of(arm)
+    return arm
 
 
 def stance_history(stances: Sequence[Mounting | ZeroOffset]) -> dict[str, Any]:

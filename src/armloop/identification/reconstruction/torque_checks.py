@@ -22,9 +22,10 @@ from armloop.identification.reconstruction.bandwidth import determined_solution
 from armloop.identification.reconstruction.mounting import Mounting
 from armloop.identification.reconstruction.plain_fits import FAR, GOOD, Fit, PlainFits
 from armloop.identification.reconstruction.readings import meant
-from armloop.identification.reconstruction.systematic_sample import even_selection
+from armloop.identification.reconstruction.systematic_sample import placed_runs
 from armloop.identification.reconstruction.zero_offsets import ZeroOffset
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 
 #: Share of friction's power that must be of one sign.
@@ -37,16 +38,25 @@ _ALIKE = 1.5
 _MOST = 4
 
 
-def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> list[Mounting | ZeroOffset]:
+def check_torques(
+    logs: Sequence[LogSource], arm: Arm, cutoff_hz: float, aside: Sequence[Array] | None = None
+) -> list[Mounting | ZeroOffset]:
     """By what the arm stands slightly otherwise than its URDF says: how its base leans, and which joints' zeros are off.
+
+    Args:
+        aside: per log, (B, 2) intervals, s, of blocks that are held out: they take no part. Where too little is left
+            without them, the torques are checked on all, and nothing is said of how the arm stands.
 
     Raises:
         LogError: the torques cannot be this arm's; with the likely cause.
     """
-    chosen = even_selection(logs)
+    placed = placed_runs(logs)
+    chosen = [run for _, run in placed]
     if cutoff_hz <= 0 or not all(is_time_series(log.q, log.runs()) for log in chosen):
         return []
-    problem = Problem.of(chosen, arm, cutoff_hz)
+    left_out = None if aside is None else [aside[k] for k, _ in placed]
+    blind = Problem.of(chosen, arm, cutoff_hz, aside=left_out)
+    problem = Problem.of(chosen, arm, cutoff_hz) if blind is None and aside else blind
     if problem is None:
         return []
     named = list(dict.fromkeys(log.name for log in chosen))
@@ -74,7 +84,7 @@ def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> list
         wrong, stance = meant(problem, chosen, cutoff_hz, plain)
         if wrong:
             raise LogError(f"{names}: {wrong}")
-        if stance is None:
+        if stance is None or blind is None:
             break
         found.append(stance)
         problem = problem.as_of(stance.of(problem.arm))
