@@ -1,6 +1,7 @@
 """Diagrams of a user's own, from the exported parts."""
 
 import runpy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,13 +12,16 @@ from pydrake.systems.primitives import LogVectorOutput
 from pydrake.trajectories import PiecewisePolynomial
 
 from armloop.drake import PidGains, add_arm_with_controller
+from armloop.drake.experiments.scenarios import Plant, load_plant
+from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.experiment.excitation import FourierReference, paper_reference
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel, load_model
 from armloop.model.components import RigidBody
-from armloop.robot.arm import load_arm
+from armloop.robot.arm import Arm, load_arm
 from armloop.robot.kinematics import nominal_parameters
-from armloop.util.errors import InputError
+from armloop.robot.levelling import base_rotation
+from armloop.util.errors import InputError, InputWarning
 
 MOTIONS = {
     3: paper_reference(),
@@ -39,9 +43,8 @@ def test_an_arm_under_pid_in_a_diagram_of_ones_own():
     assert 1e-4 < error.max() < 0.2
 
 
-def test_a_model_file_takes_the_place_of_nothing(tmp_path):
-    """The same lines with a model: what PID alone leaves of the error nearly goes away."""
-    arm = load_arm("three_axis")
+def known(arm: Arm) -> ReconstructedModel:
+    """The model of the simulated three-axis arm, on an arm that stands like this one."""
     laws = [(0.557, 2.65, 0.1671), (0.757, 1.82, 0.2271), (0.585, 3.14, 0.1755)]
     friction = FrictionLaw(
         tuple(
@@ -53,21 +56,43 @@ def test_a_model_file_takes_the_place_of_nothing(tmp_path):
             for fc, fv, drop in laws
         )
     )
-    body = RigidBody(nominal_parameters(arm), ("m1",), np.array([1.0]))
-    ReconstructedModel(arm, (body,), friction).save(tmp_path / "model.json")
+    return ReconstructedModel(arm, (RigidBody(nominal_parameters(arm), ("m1",), np.array([1.0])),), friction)
 
-    largest = {}
-    for model in (None, load_model(tmp_path / "model.json", arm)):
-        builder = DiagramBuilder()
-        loop = add_arm_with_controller(builder, "three_axis", PidGains.paper(3), paper_reference(), model)
-        simulator = Simulator(builder.Build())
-        loop.start_on_reference(simulator.get_mutable_context())
-        simulator.AdvanceTo(0.5)
-        state = loop.plant.GetOutputPort("state").Eval(
-            loop.plant.GetMyContextFromRoot(simulator.get_context())
-        )
-        largest[model is None] = np.abs(state[:3] - loop.reference.tables[0][500]).max()
-    assert largest[False] < 0.01 * largest[True]
+
+def largest_error(model: ReconstructedModel | None, arm: str | Plant = "three_axis", effects=()) -> float:
+    """After half a second under PID, with a model or alone, rad."""
+    builder = DiagramBuilder()
+    loop = add_arm_with_controller(builder, arm, PidGains.paper(3), paper_reference(), model, effects=effects)
+    simulator = Simulator(builder.Build())
+    loop.start_on_reference(simulator.get_mutable_context())
+    simulator.AdvanceTo(0.5)
+    state = loop.plant.GetOutputPort("state").Eval(loop.plant.GetMyContextFromRoot(simulator.get_context()))
+    return float(np.abs(state[:3] - loop.reference.tables[0][500]).max())
+
+
+def test_a_model_file_takes_the_place_of_nothing(tmp_path):
+    """The same lines with a model: what PID alone leaves of the error nearly goes away."""
+    arm = load_arm("three_axis")
+    known(arm).save(tmp_path / "model.json")
+    assert largest_error(load_model(tmp_path / "model.json", arm)) < 0.01 * largest_error(None)
+
+
+def test_a_model_of_an_arm_that_stands_otherwise_serves_one_that_does(recwarn):
+    """A base that leans and a joint whose zero is off; beside an arm as its URDF has it, that is said."""
+    arm = load_arm("three_axis")
+    leaning = replace(arm, gravity=base_rotation(0.05, -0.1).T @ arm.gravity)
+    tilt = [UndeclaredEffect("gravity_tilt", None, {"roll": 0.05, "pitch": -0.1})]
+    assert largest_error(known(leaning), effects=tilt) < 0.01 * largest_error(None, effects=tilt)
+    further = arm.with_zero(1, 0.2)
+    plant = replace(load_plant("three_axis"), arm=further)
+    assert largest_error(known(further), plant) < 0.01 * largest_error(None, plant)
+    assert not recwarn.list
+    for model, words in (
+        (known(leaning), "its base leans by 6"),
+        (known(further), "its zero of joint 2 is 0.2000 rad"),
+    ):
+        with pytest.warns(InputWarning, match=words):
+            largest_error(model)
 
 
 @pytest.mark.parametrize("arms", [("three_axis", "three_axis", "three_axis"), ("three_axis", "scara")])
