@@ -4,6 +4,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,10 @@ from synthetic import measured as recorded
 from armloop.api.model import load_model as api_load
 from armloop.data.log import MotionLog, read_log
 from armloop.data.signals import preprocess
-from armloop.identification.reconstruction import Options, reconstruct
+from armloop.identification.reconstruction import Options, mounting, reconstruct
 from armloop.identification.reconstruction.gravity_direction import Direction
-from armloop.identification.reconstruction.mounting import Mounting
+from armloop.identification.reconstruction.mounting import Mounting, earned
+from armloop.identification.reconstruction.plain_fits import Fit
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import score
 from armloop.model import load_model
@@ -165,6 +167,73 @@ def test_a_model_is_reconstructed_on_what_stands_aside(monkeypatch: pytest.Monke
     assert len(asked) == 2
     for arm, aside in asked:
         assert arm is three_axis() and len(aside) == 2 and all(len(intervals) for intervals in aside)
+
+
+def fit_of(*relative: float, faults: int = 0) -> Fit:
+    return Fit(
+        np.array(relative),
+        np.ones(len(relative)),
+        np.where(np.arange(len(relative)) < faults, -1.0, 1.0),
+    )
+
+
+@pytest.mark.parametrize(
+    ("other", "sprung", "taken"),
+    [
+        # all a tenth better in the geometric mean, a second joint by a fifth, and none worse than by a quarter
+        (fit_of(0.2, 0.2, 0.3), fit_of(0.3, 0.3, 0.3), True),
+        (fit_of(0.245, 0.245, 0.369), fit_of(0.3, 0.3, 0.3), False),
+        (fit_of(0.2, 0.249, 0.3), fit_of(0.3, 0.3, 0.3), True),
+        (fit_of(0.1, 0.251, 0.3), fit_of(0.3, 0.3, 0.3), False),
+        (fit_of(0.1, 0.1, 0.374), fit_of(0.3, 0.3, 0.3), True),
+        (fit_of(0.1, 0.1, 0.376), fit_of(0.3, 0.3, 0.3), False),
+        # more than springs do, by a fifth in logarithms: 2.25 times against 2.25 ** (1 / 1.2) = 1.966
+        (fit_of(0.2, 0.2, 0.1 * 8 / 9), fit_of(0.2, 0.2, 0.134), True),
+        (fit_of(0.2, 0.2, 0.1 * 8 / 9), fit_of(0.2, 0.2, 0.08), False),
+        # and not less physically
+        (fit_of(0.2, 0.2, 0.3, faults=1), fit_of(0.3, 0.3, 0.3), True),
+        (fit_of(0.2, 0.2, 0.3, faults=2), fit_of(0.3, 0.3, 0.3), False),
+    ],
+)  # fmt: skip
+def test_another_stance_must_explain_more_than_what_looks_like_it(
+    other: Fit, sprung: Fit, taken: bool
+) -> None:
+    springs = SimpleNamespace(fit=lambda signs, order: sprung)
+    problem: Any = SimpleNamespace(arm=SimpleNamespace(n=3), sprung=lambda: springs)
+    assert earned(problem, fit_of(0.3, 0.3, 0.3, faults=1), other) is taken
+
+
+@pytest.mark.parametrize(
+    ("degrees", "error", "taken"),
+    [
+        (2.0, 0.3, True),
+        (2.0, 0.5, False),
+        (0.9, 0.01, False),
+        (1.1, 0.01, True),
+        (19.0, 0.1, True),
+        (21.0, 0.1, None),
+    ],
+)
+def test_a_lean_is_more_than_a_degree_and_its_error(
+    degrees: float, error: float, taken: bool | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One of more than twenty degrees is another mounting."""
+    down = np.array([np.sin(np.radians(degrees)), 0.0, -np.cos(np.radians(degrees))])
+    found = Direction(down, np.eye(3)[:2], np.diag([np.radians(error) ** 2] * 2))
+    better, plain = fit_of(0.1, 0.1), fit_of(0.3, 0.3)
+    leaning = SimpleNamespace(left=lambda: better, fit=lambda signs, order: better)
+    level = SimpleNamespace(left=lambda: plain, fit=lambda signs, order: plain)
+    problem: Any = SimpleNamespace(
+        arm=SimpleNamespace(n=2, gravity=np.array([0.0, 0.0, -9.81])),
+        under=lambda other: leaning if other @ down > 0.9999 else level,
+        sprung=lambda: level,
+        left=lambda: plain,
+    )
+    problem.every = lambda step: problem
+    monkeypatch.setattr(mounting, "refined", lambda problem, first: found)
+    monkeypatch.setattr(mounting, "nearby", lambda times, first: down)
+    told = mounting.other_mounting(problem, plain)
+    assert (told is not None and told.slight) is (taken is True)
 
 
 def test_angles_of_a_direction_and_their_errors() -> None:

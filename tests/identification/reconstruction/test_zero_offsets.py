@@ -1,6 +1,8 @@
 """Joints that are further than their positions say: by a little, which the model takes in, or by a quarter turn."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +11,8 @@ from synthetic import measured as recorded
 
 from armloop.data.log import MotionLog, read_log
 from armloop.data.signals import preprocess
-from armloop.identification.reconstruction import reconstruct
+from armloop.identification.reconstruction import reconstruct, zero_offsets
+from armloop.identification.reconstruction.plain_fits import Fit
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.reconstruction.zero_offsets import ZeroOffset
 from armloop.identification.scoring import score
@@ -75,6 +78,43 @@ def test_a_model_of_an_arm_whose_zero_is_off_has_it(tmp_path: Path) -> None:
     assert kept.history["zeros"][0]["joint"] == 2
     fresh = preprocess([a_run(real, 3)], kept.conditioning)
     assert max(score(kept, fresh).moving["nrmse"]) < 0.06
+
+
+@pytest.mark.parametrize(
+    ("angle", "error", "slight"),
+    [(0.011, 1e-4, True), (0.009, 1e-4, None), (0.02, 0.0039, True), (0.02, 0.0041, None), (0.34, 0.01, True),
+     (-0.36, 0.01, False)],
+)  # fmt: skip
+def test_a_zero_is_off_by_more_than_its_error_and_another_one_by_more_than_a_third(
+    angle: float, error: float, slight: bool | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = set()
+
+    def refined(problem: Any, joint: int, start: float) -> ZeroOffset:
+        asked.add(joint)
+        return ZeroOffset(joint, angle if joint == 1 else 0.0, error)
+
+    errors = {
+        False: Fit(*np.array([[0.3] * 4, [1.0] * 4, [1.0] * 4])),
+        True: Fit(*np.array([[0.1] * 4, [1.0] * 4, [1.0] * 4])),
+    }
+    fits = {
+        key: SimpleNamespace(left=lambda f=fit: f, fit=lambda s, o, f=fit: f) for key, fit in errors.items()
+    }
+    problem: Any = SimpleNamespace(
+        arm=SimpleNamespace(
+            n=4, revolute=np.array([True, True, False, True]), with_zero=lambda joint, by: (joint, by)
+        ),
+        as_of=lambda arm: fits[arm == (1, angle)],
+        sprung=lambda: fits[False],
+        left=lambda: errors[False],
+    )
+    problem.every = lambda step: problem
+    monkeypatch.setattr(zero_offsets, "_refined", refined)
+    found = zero_offsets.other_zero(problem, errors[False])
+    # what slides has no zero that torques tell, nor has the last joint
+    assert asked == {0, 1}
+    assert found is None if slight is None else (found is not None and found.slight is slight)
 
 
 @pytest.mark.long

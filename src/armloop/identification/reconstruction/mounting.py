@@ -21,7 +21,7 @@ from armloop.identification.reconstruction.plain_fits import (
     PlainFits,
 )
 from armloop.robot.arm import Arm
-from armloop.robot.levelling import of_a_lean
+from armloop.robot.levelling import of_a_lean, turning, vector
 from armloop.util.arrays import Array
 
 #: The directions that are tried first: towards faces, edges and corners of a cube, no point of the sphere further from one
@@ -60,6 +60,15 @@ class Mounting:
         """Whether the base only leans."""
         return self.lean is not None
 
+    @property
+    def place(self) -> str:
+        """What stands otherwise."""
+        return "base"
+
+    def read(self, problem: PlainFits) -> PlainFits:
+        """What is regressed of a record of the arm that is mounted so."""
+        return problem.under(self.down)
+
     def of(self, arm: Arm) -> Arm:
         """The arm under gravity along this direction."""
         return replace(arm, gravity=float(np.linalg.norm(arm.gravity)) * self.down)
@@ -73,6 +82,13 @@ class Mounting:
         """What was found of a base that leans, and what is done about it."""
         assert self.lean is not None
         return of_a_lean(**self.to_dict())
+
+    def otherwise(self, better: str) -> str:
+        """What is wrong with a URDF that stands otherwise, and what would be right; ``better`` says what that explains."""
+        return (
+            "the arm seems to be mounted otherwise than its URDF says: with gravity along "
+            f"{vector(self.down.tolist(), 2)} of the base frame {better}; {turning(self.down)}"
+        )
 
 
 def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from armloop.data.log import MotionLog, unchecked_log
-from armloop.identification.reconstruction.mounting import SECOND, Mounting, other_mounting
+from armloop.identification.reconstruction.mounting import SECOND, other_mounting
 from armloop.identification.reconstruction.plain_fits import (
     AS_GOOD,
     GOOD,
@@ -24,9 +24,9 @@ from armloop.identification.reconstruction.plain_fits import (
     Fit,
     PlainFits,
 )
-from armloop.identification.reconstruction.zero_offsets import ZeroOffset, other_zero
+from armloop.identification.reconstruction.stances import Stance
+from armloop.identification.reconstruction.zero_offsets import other_zero
 from armloop.robot.arm import Arm
-from armloop.robot.levelling import of_another_zero, turning, vector
 from armloop.util.arrays import Array, Index
 
 #: Mean relative error below which a record is taken as it stands; of a joint that is met so well, better says nothing.
@@ -56,15 +56,13 @@ class Reading(NamedTuple):
         order: (n,) which columns are those of joint k.
         unit: that of angles, radians if empty.
         turned: joints whose q, v and tau count in the other direction.
-        down: direction of gravity in the base frame, a unit vector; the arm's if empty.
-        zero: a joint's zero that is another than the URDF's.
+        stance: how the arm stands otherwise than its URDF says.
     """
 
     order: Index
     unit: str = ""
     turned: tuple[int, ...] = ()
-    down: tuple[float, ...] = ()
-    zero: ZeroOffset | None = None
+    stance: Stance | None = None
 
     def of(self, log: MotionLog, arm: Arm) -> MotionLog:
         """The log as it would be, read so."""
@@ -84,10 +82,8 @@ class Reading(NamedTuple):
 
     def problem(self, plain: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float) -> PlainFits | None:
         """What is regressed of the record, read so; None where there is too little motion."""
-        if self.down:
-            return plain.under(np.array(self.down))
-        if self.zero is not None:
-            return plain.as_of(self.zero.of(plain.arm))
+        if self.stance is not None:
+            return self.stance.read(plain)
         if not self.unit:
             return plain.read(self.order, self.signs)
         # a law of friction that is met badly may be met better at other speeds, and says nothing of a unit
@@ -99,13 +95,18 @@ class Reading(NamedTuple):
         """Whether a record explained so, read so, is not meant as it stands; springs at its joints may explain as much."""
         if other.faults.sum() > plain.faults.sum() or other.relative.max() >= GOOD:
             return False
-        if self.turned or self.down or self.zero:
+        if self.turned or self.stance:
             each = [plain.over(other, [j], _GOOD_ENOUGH) for j in range(len(self.order))]
             best, mean, worst = _SENSE
             better = max(each) > best and plain.over(other, least=_GOOD_ENOUGH) > mean and min(each) > worst
             alone = not self.turned and min(sorted(each)[-2:]) < SECOND
             return better and not alone and sprung.over(other) > 1
         return plain.over(other) > (_UNIT if self.unit else _ORDER)
+
+    @property
+    def slight(self) -> bool:
+        """Whether the arm stands only slightly otherwise, which is no fault of the record."""
+        return self.stance is not None and self.stance.slight
 
     def which(self) -> str:
         """The joints that count in the other direction, with the verb."""
@@ -117,13 +118,8 @@ class Reading(NamedTuple):
         better = f"all torques are explained {times:.2g} times as well"
         if self.unit:
             return f"angles seem to be in {self.unit}: read so {better}; give q in rad and v in rad/s"
-        if self.down:
-            return (
-                "the arm seems to be mounted otherwise than its URDF says: with gravity along "
-                f"{vector(self.down, 2)} of the base frame {better}; {turning(np.array(self.down))}"
-            )
-        if self.zero is not None:
-            return f"{of_another_zero(self.zero.joint + 1, self.zero.angle)} {better}"
+        if self.stance is not None:
+            return self.stance.otherwise(better)
         if self.turned:
             return (
                 f"{self.which()} in the direction against the URDF's axis: with q, v and tau of the other sign {better}; "
@@ -164,7 +160,7 @@ def _orders(n: int) -> Iterator[tuple[int, ...]]:
 
 def meant(
     problem: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float, plain: Fit
-) -> tuple[str, Mounting | ZeroOffset | None]:
+) -> tuple[str, Stance | None]:
     """What is wrong with a record that another reading explains far better, the simplest of the best; or is slightly off.
 
     Args:
@@ -182,7 +178,7 @@ def meant(
     first = few.left()
     sprung = problem.sprung().fit(np.ones(n), np.arange(n))
     stances = [other for other in (other_mounting(problem, plain), other_zero(problem, plain)) if other]
-    stood = [Reading(np.arange(n), **_as_read(other)) for other in stances]
+    stood = (Reading(np.arange(n), stance=stance) for stance in stances)
     for reading in (*stood, *readings(problem.arm)):
         if reading.turned:
             if first.over(few.read(reading.order, reading.signs).left()) < PROMISING:
@@ -191,22 +187,15 @@ def meant(
         if read is None:
             continue
         other = read.fit(np.ones(n), np.arange(n))
-        slight = any(reading is own and stance.slight for own, stance in zip(stood, stances, strict=True))
-        if slight or reading.far_better(plain, other, sprung):
+        if reading.slight or reading.far_better(plain, other, sprung):
             found.append((reading, plain.over(other)))
     best = max((times for _, times in found), default=0.0)
     near = sorted((pair for pair in found if pair[1] >= AS_GOOD * best), key=lambda pair: len(pair[0].turned))
     if not near:
         return "", None
     reading, times = near[0]
-    for own, stance in zip(stood, stances, strict=True):
-        if reading is own and stance.slight:
-            return "", stance
+    if reading.slight:
+        return "", reading.stance
     # an arm that hangs is its own mirror image, whose joints turn the other way
     others = [f"; or {other.which()} against the URDF's axes" for other, _ in near if other.turned]
-    return reading.words(times) + "".join(others[:1] if reading.down else []), None
-
-
-def _as_read(stance: Mounting | ZeroOffset) -> dict[str, Any]:
-    """How a reading has it that the arm stands otherwise."""
-    return {"zero": stance} if isinstance(stance, ZeroOffset) else {"down": tuple(stance.down.tolist())}
+    return reading.words(times) + "".join(others[:1] if reading.stance else []), None

@@ -32,15 +32,14 @@ from armloop.identification.reconstruction.libraries import (
     named,
 )
 from armloop.identification.reconstruction.library import METHODS, REFERENCE, Library
-from armloop.identification.reconstruction.mounting import Mounting
 from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.identification.reconstruction.preparation import Prepared, prepared
 from armloop.identification.reconstruction.ripple import find_ripple
 from armloop.identification.reconstruction.ripple import notes as ripple_notes
 from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
+from armloop.identification.reconstruction.stances import as_it_stands, stance_history
 from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
-from armloop.identification.reconstruction.zero_offsets import ZeroOffset
 from armloop.identification.scoring import Score, residual
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
@@ -204,20 +203,6 @@ def reconstruct(
     refused = {} if library is not None else _refused(arm, wanted, ready)
     tried, part = _compared(wanted, refused, attempt, ready)
     return _finished(tried, part, method, ready, progress, recorded)
-
-
-def as_it_stands(arm: Arm, stances: Sequence[Mounting | ZeroOffset]) -> Arm:
-    """The arm that stands otherwise than its URDF says in so many ways."""
-    for stance in stances:
-        arm = stance.of(arm)
-    return arm
-
-
-def stance_history(stances: Sequence[Mounting | ZeroOffset]) -> dict[str, Any]:
-    """What a model's history holds of how the arm stands."""
-    zeros = [stance.to_dict() for stance in stances if isinstance(stance, ZeroOffset)]
-    leaning = [stance.to_dict() for stance in stances if isinstance(stance, Mounting)]
-    return {**({"leaning": leaning[-1]} if leaning else {}), **({"zeros": zeros} if zeros else {})}
 
 
 def _refused(arm: Arm, wanted: Sequence[Library], ready: Prepared) -> dict[Library, str]:

@@ -19,11 +19,10 @@ import numpy as np
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
 from armloop.identification.reconstruction.bandwidth import determined_solution
-from armloop.identification.reconstruction.mounting import Mounting
 from armloop.identification.reconstruction.plain_fits import FAR, GOOD, Fit, PlainFits
 from armloop.identification.reconstruction.readings import meant
+from armloop.identification.reconstruction.stances import Stance
 from armloop.identification.reconstruction.systematic_sample import placed_runs
-from armloop.identification.reconstruction.zero_offsets import ZeroOffset
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.errors import LogError
@@ -40,7 +39,7 @@ _MOST = 4
 
 def check_torques(
     logs: Sequence[LogSource], arm: Arm, cutoff_hz: float, aside: Sequence[Array] | None = None
-) -> list[Mounting | ZeroOffset]:
+) -> list[Stance]:
     """By what the arm stands slightly otherwise than its URDF says: how its base leans, and which joints' zeros are off.
 
     Args:
@@ -79,16 +78,17 @@ def check_torques(
             f"{names}: the torques do not fit one another: tau{j + 1} is about {float(f'{1 / factor:.2g}'):g} times what "
             "the links give that explain the other joints; check the units and drive gains of all joints"
         )
-    found: list[Mounting | ZeroOffset] = []
+    found: list[Stance] = []
+    stood: PlainFits = problem
     while len(found) < _MOST:
-        wrong, stance = meant(problem, chosen, cutoff_hz, plain)
+        wrong, stance = meant(stood, chosen, cutoff_hz, plain)
         if wrong:
             raise LogError(f"{names}: {wrong}")
-        if stance is None or blind is None:
+        if stance is None or blind is None or stance.place in {one.place for one in found}:
             break
         found.append(stance)
-        problem = problem.as_of(stance.of(problem.arm))
-        plain = problem.fit(np.ones(arm.n), np.arange(arm.n))
+        stood = stance.read(stood)
+        plain = stood.fit(np.ones(arm.n), np.arange(arm.n))
     return found
 
 

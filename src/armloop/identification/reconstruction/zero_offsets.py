@@ -15,7 +15,7 @@ from armloop.identification.reconstruction.gravity_direction import gauss_newton
 from armloop.identification.reconstruction.mounting import earned
 from armloop.identification.reconstruction.plain_fits import PROMISING, SCREENED, Fit, PlainFits
 from armloop.robot.arm import Arm
-from armloop.robot.levelling import of_a_zero
+from armloop.robot.levelling import of_a_zero, of_another_zero
 from armloop.robot.newton_euler import joint_torques
 from armloop.util.arrays import Array
 
@@ -42,6 +42,15 @@ class ZeroOffset:
         """Whether it is the URDF's zero, a little off."""
         return abs(self.angle) < OTHER
 
+    @property
+    def place(self) -> int:
+        """What stands otherwise."""
+        return self.joint
+
+    def read(self, problem: PlainFits) -> PlainFits:
+        """What is regressed of a record of the arm with this zero."""
+        return problem.as_of(self.of(problem.arm))
+
     def of(self, arm: Arm) -> Arm:
         """The arm with this zero."""
         return arm.with_zero(self.joint, self.angle)
@@ -53,6 +62,10 @@ class ZeroOffset:
     def note(self) -> str:
         """What was found, and what is done about it."""
         return of_a_zero(**self.to_dict())
+
+    def otherwise(self, better: str) -> str:
+        """What is wrong with a record that counts from another zero; ``better`` says how much it explains from there."""
+        return f"{of_another_zero(self.joint + 1, self.angle)} {better}"
 
 
 def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
@@ -77,7 +90,7 @@ def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
             if abs(offset.angle) < _EXACT or quickly(joint, offset.angle) < PROMISING:
                 continue
             offset = _refined(problem, joint, offset.angle)
-            other = problem.as_of(offset.of(problem.arm)).fit(np.ones(n), np.arange(n))
+            other = offset.read(problem).fit(np.ones(n), np.arange(n))
             seen = abs(offset.angle) > max(_EXACT, _SEEN * offset.std_error)
             if seen and earned(problem, plain, other):
                 tried.append((plain.over(other), offset))
