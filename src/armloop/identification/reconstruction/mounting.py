@@ -116,9 +116,9 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
         return None if found is None else Mounting(found)
     leans = [refined(few, given).down]
     if found is not None:
-        upright = _upright(found, given)
+        # from a level base the torques of upright axes, as a SCARA's, have no slope; and where it leans they hang as well
         leans.append(
-            nearby(lambda down: quickly(down) if down @ given > np.cos(_LEANS) else _NOT_AT_ALL, upright)
+            nearby(lambda down: quickly(down) if down @ given > np.cos(_LEANS) else _NOT_AT_ALL, given)
         )
     near = [refined(problem, lean) for lean in leans if quickly(lean) > PROMISING]
     near = [one for one in near if one.beside(given) < _LEANS]
@@ -129,18 +129,6 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
         leaning = problem.under(lean.down).fit(ones, as_given)
         return Mounting(lean.down, lean, angle) if seen and earned(problem, plain, leaning) else None
     return None if found is None else Mounting(found)
-
-
-def _upright(found: Array, given: Array) -> Array:
-    """A first direction of a base that leans the way of one that was found (3,).
-
-    Joints that a level base spares gravity, as a SCARA's, are pulled at as well by the slightest lean as by any; and where
-    it leans they hang as well as they stand.
-    """
-    aside = found - (found @ given) * given
-    length = float(np.linalg.norm(aside))
-    angle = min(float(np.arctan2(length, abs(found @ given))), _LEANS / 2)
-    return np.asarray(np.cos(angle) * given + np.sin(angle) * aside / max(length, _NOT_AT_ALL))
 
 
 def earned(problem: PlainFits, plain: Fit, other: Fit) -> bool:
