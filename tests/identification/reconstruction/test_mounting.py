@@ -17,9 +17,9 @@ from armloop.api.model import load_model as api_load
 from armloop.data.log import MotionLog, read_log
 from armloop.data.signals import preprocess
 from armloop.identification.reconstruction import Options, mounting, reconstruct
-from armloop.identification.reconstruction.gravity_direction import Direction
+from armloop.identification.reconstruction.gravity_direction import Direction, refined
 from armloop.identification.reconstruction.mounting import Mounting, earned
-from armloop.identification.reconstruction.plain_fits import Fit
+from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import score
 from armloop.model import load_model
@@ -244,3 +244,18 @@ def test_angles_of_a_direction_and_their_errors() -> None:
     assert direction.beside(-down) == pytest.approx(np.pi)
     assert direction.standardised(aside) == pytest.approx(np.sin(0.3) / 0.1)
     assert direction.std_error == pytest.approx(0.1)
+
+
+def test_errors_of_a_direction_are_as_large_as_disturbances_that_last_make_them() -> None:
+    """Those of single instants would be too small by the root of the instants in a block, some six times."""
+    arm, given, sizes = three_axis(), np.array([0.0, 0.0, -1.0]), []
+    for seed in range(1, 13):
+        motion = fourier_motion(80.0, 100.0, seed)
+        tau = rigid_torque(arm, motion.q, motion.v, motion.vdot) + 0.3 * np.sign(motion.v)
+        lasting = np.repeat(np.random.default_rng(seed).standard_normal((80, 3)), 100, axis=0)
+        log = recorded(motion, tau + 0.05 * np.mean(np.abs(tau), axis=0) * lasting, seed)
+        problem = PlainFits.of([log], arm, 10.0)
+        assert problem is not None
+        sizes.append(refined(problem, given).standardised(given))
+    # of two independent standardised angles: root two
+    assert 0.5 < np.sqrt(np.mean(np.square(sizes)) / 2) < 2.0

@@ -261,6 +261,10 @@ def chosen(plain: Fit, others: dict[str, Fit], monkeypatch: pytest.MonkeyPatch) 
         (fit_of([0.3, 0.2]), {"2": fit_of([0.38, 0.06])}, ""),
         (fit_of([0.2] * 8), {"2": fit_of([0.2] * 7 + [0.04])}, "joint 2 counts"),
         (fit_of([0.2] * 8), {"2": fit_of([0.2] * 7 + [0.05])}, ""),
+        # of a joint that is met within two hundredths, better says nothing
+        (fit_of([0.05, 0.3]), {"2": fit_of([0.001, 0.2])}, "joint 2 counts"),
+        (fit_of([0.03, 0.3]), {"2": fit_of([0.001, 0.2])}, ""),
+        (fit_of([0.3, 0.02, 0.02, 0.02]), {"2": fit_of([0.149, 0.001, 0.001, 0.001])}, ""),
         # and better than with springs
         (fit_of([0.3, 0.2]), {"2": fit_of([0.1, 0.1]), "springs": fit_of([0.1, 0.101])}, "joint 2 counts"),
         (fit_of([0.3, 0.2]), {"2": fit_of([0.1, 0.1]), "springs": fit_of([0.1, 0.099])}, ""),
