@@ -68,17 +68,21 @@ def refined(problem: PlainFits, down: Array) -> Direction:
 
 def _step(problem: PlainFits, down: Array) -> tuple[Array, Direction]:
     """By how much a direction is off (3,), and it with its errors."""
-    across = np.linalg.svd(down[None])[2][1:]
-
-    def slopes(under: PlainFits, links: Array) -> Array:
-        q, g = under.table.motion.q, float(np.linalg.norm(under.arm.gravity))
-        still = np.zeros_like(q)
-        return np.stack(
-            [joint_torques(under.arm, links, q, still, still, g * axis) for axis in across], axis=2
-        )
-
-    off, covariance = gauss_newton(problem.under(down), slopes)
+    across = across_of(down)
+    off, covariance = gauss_newton(problem.under(down), lambda of, links: gravity_slopes(of, links, across))
     return off @ across, Direction(down, across, covariance)
+
+
+def across_of(down: Array) -> Array:
+    """(2, 3) unit vectors across a direction (3,)."""
+    return np.asarray(np.linalg.svd(down[None])[2][1:])
+
+
+def gravity_slopes(problem: PlainFits, links: Array, across: Array) -> Array:
+    """(N, n, 2) torques per radian by which gravity turns towards each of two directions, of links (10 n,)."""
+    q, g = problem.table.motion.q, float(np.linalg.norm(problem.arm.gravity))
+    still = np.zeros_like(q)
+    return np.stack([joint_torques(problem.arm, links, q, still, still, g * axis) for axis in across], axis=2)
 
 
 def gauss_newton(problem: PlainFits, slopes: Callable[[PlainFits, Array], Array]) -> tuple[Array, Array]:
@@ -105,7 +109,7 @@ def gauss_newton(problem: PlainFits, slopes: Callable[[PlainFits, Array], Array]
 
 def nearby(times: Callable[[Array], float], first: Array) -> Array:
     """The direction near a first one (3,) by which most is explained, by a simplex search."""
-    across = np.linalg.svd(first[None])[2][1:]
+    across = across_of(first)
 
     def turned(angles: Array) -> Array:
         return np.asarray(Rotation.from_rotvec(angles @ across).apply(first))

@@ -49,16 +49,24 @@ class Mounting:
         down: (3,) direction of gravity in the base frame, a unit vector.
         lean: the same with its errors, where the base only leans.
         angle: by how much the base leans, rad.
+        clearness: how many times as far as what would not be seen.
     """
 
     down: Array
     lean: Direction | None = None
     angle: float = 0.0
+    clearness: float = 0.0
+
+    @classmethod
+    def leaning(cls, found: Direction, given: Array) -> Mounting:
+        """A base that leans to a direction that was found, from the URDF's (3,)."""
+        angle = found.beside(given)
+        return cls(found.down, found, angle, min(angle / _LEVEL, found.standardised(given) / _SEEN))
 
     @property
     def slight(self) -> bool:
         """Whether the base only leans."""
-        return self.lean is not None
+        return self.lean is not None and self.angle < _LEANS
 
     @property
     def place(self) -> str:
@@ -124,10 +132,9 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
     near = [one for one in near if one.beside(given) < _LEANS]
     lean = max(near, key=lambda one: times(one.down), default=None)
     if lean is not None and (found is None or times(lean.down) >= AS_GOOD * times(found)):
-        angle = lean.beside(given)
-        seen = angle > _LEVEL and lean.standardised(given) > _SEEN
-        leaning = problem.under(lean.down).fit(ones, as_given)
-        return Mounting(lean.down, lean, angle) if seen and earned(problem, plain, leaning) else None
+        leaning = Mounting.leaning(lean, given)
+        other = problem.under(lean.down).fit(ones, as_given)
+        return leaning if leaning.clearness > 1 and earned(problem, plain, other) else None
     return None if found is None else Mounting(found)
 
 

@@ -16,12 +16,14 @@ from itertools import combinations
 
 import numpy as np
 
+from armloop.data.log import MotionLog
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
 from armloop.identification.reconstruction.bandwidth import determined_solution
 from armloop.identification.reconstruction.plain_fits import FAR, GOOD, Fit, PlainFits
-from armloop.identification.reconstruction.readings import meant
-from armloop.identification.reconstruction.stances import Stance
+from armloop.identification.reconstruction.readings import meant, well_explained
+from armloop.identification.reconstruction.stances import Stance, as_it_stands
+from armloop.identification.reconstruction.stances_together import together
 from armloop.identification.reconstruction.systematic_sample import placed_runs
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
@@ -78,18 +80,34 @@ def check_torques(
             f"{names}: the torques do not fit one another: tau{j + 1} is about {float(f'{1 / factor:.2g}'):g} times what "
             "the links give that explain the other joints; check the units and drive gains of all joints"
         )
+    wrong, found = _otherwise(problem, chosen, cutoff_hz, plain)
+    if wrong:
+        raise LogError(f"{names}: {wrong}")
+    return found if blind is not None else []
+
+
+def _otherwise(
+    problem: PlainFits, logs: list[MotionLog], cutoff_hz: float, plain: Fit
+) -> tuple[str, list[Stance]]:
+    """What is wrong with a record that is meant otherwise, if anything is; and by what the arm stands slightly otherwise."""
+    if well_explained(plain):
+        return "", []
     found: list[Stance] = []
-    stood: PlainFits = problem
+    stood, left = problem, plain
     while len(found) < _MOST:
-        wrong, stance = meant(stood, chosen, cutoff_hz, plain)
-        if wrong:
-            raise LogError(f"{names}: {wrong}")
-        if stance is None or blind is None or stance.place in {one.place for one in found}:
+        wrong, stance = meant(stood, logs, cutoff_hz, left)
+        if wrong or stance is None or stance.place in {one.place for one in found}:
             break
         found.append(stance)
         stood = stance.read(stood)
-        plain = stood.fit(np.ones(arm.n), np.arange(arm.n))
-    return found
+        left = stood.fit(np.ones(problem.arm.n), np.arange(problem.arm.n))
+    if all_of_them := together(problem, plain, found):
+        found = all_of_them
+        if wrong:
+            stood = problem.as_of(as_it_stands(problem.arm, found))
+            left = stood.fit(np.ones(problem.arm.n), np.arange(problem.arm.n))
+            wrong, _ = meant(stood, logs, cutoff_hz, left)
+    return wrong, found
 
 
 class Problem(PlainFits):

@@ -43,6 +43,11 @@ class ZeroOffset:
         return abs(self.angle) < OTHER
 
     @property
+    def clearness(self) -> float:
+        """How many times as far off as what would not be seen."""
+        return abs(self.angle) / max(_EXACT, _SEEN * self.std_error)
+
+    @property
     def place(self) -> int:
         """What stands otherwise."""
         return self.joint
@@ -91,8 +96,7 @@ def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
                 continue
             offset = _refined(problem, joint, offset.angle)
             other = offset.read(problem).fit(np.ones(n), np.arange(n))
-            seen = abs(offset.angle) > max(_EXACT, _SEEN * offset.std_error)
-            if seen and earned(problem, plain, other):
+            if offset.clearness > 1 and earned(problem, plain, other):
                 tried.append((plain.over(other), offset))
     return max(tried, key=lambda one: one[0])[1] if tried else None
 
@@ -100,17 +104,20 @@ def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
 def _refined(problem: PlainFits, joint: int, angle: float) -> ZeroOffset:
     """The zero near an angle that explains most, by Gauss-Newton steps."""
 
-    def slopes(of: PlainFits, links: Array) -> Array:
-        m = of.table.motion
-        there, back = (
-            joint_torques(of.arm.with_zero(joint, h), links, m.q, m.v, m.vdot) for h in (_STEP, -_STEP)
-        )
-        return np.asarray((there - back)[:, :, None] / (2 * _STEP))
-
     for _ in range(_STEPS):
-        off, covariance = gauss_newton(problem.as_of(problem.arm.with_zero(joint, angle)), slopes)
+        there = problem.as_of(problem.arm.with_zero(joint, angle))
+        off, covariance = gauss_newton(there, lambda of, links: zero_slopes(of, links, joint))
         step = float(np.clip(off[0], -_LONGEST, _LONGEST))
         angle += step
         if abs(step) < _SHORT:
             break
     return ZeroOffset(joint, float((angle + np.pi) % (2 * np.pi) - np.pi), float(np.sqrt(covariance[0, 0])))
+
+
+def zero_slopes(problem: PlainFits, links: Array, joint: int) -> Array:
+    """(N, n, 1) torques per radian by which a joint is further than its position says, of links (10 n,)."""
+    m = problem.table.motion
+    there, back = (
+        joint_torques(problem.arm.with_zero(joint, h), links, m.q, m.v, m.vdot) for h in (_STEP, -_STEP)
+    )
+    return np.asarray((there - back)[:, :, None] / (2 * _STEP))
