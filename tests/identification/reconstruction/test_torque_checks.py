@@ -135,6 +135,7 @@ class TestWhole:
         monkeypatch.setattr(torque_checks, "placed_runs", lambda logs: list(enumerate(logs)))
         monkeypatch.setattr(torque_checks, "is_time_series", lambda q, runs: q)
         monkeypatch.setattr(torque_checks, "meant", lambda *_: ("", None))
+        monkeypatch.setattr(torque_checks, "together", lambda *_: [])
         return asked
 
     @staticmethod

@@ -158,11 +158,6 @@ def _orders(n: int) -> Iterator[tuple[int, ...]]:
         yield tuple((k + step) % n for k in range(n))
 
 
-def well_explained(plain: Fit) -> bool:
-    """Whether a record is taken as it stands."""
-    return float(np.mean(plain.relative)) < _GOOD_ENOUGH
-
-
 def meant(
     problem: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float, plain: Fit
 ) -> tuple[str, Stance | None]:
@@ -175,7 +170,7 @@ def meant(
     Returns:
         Empty words if no reading does; and how the base leans, or a joint's zero is off, if that explains most.
     """
-    if well_explained(plain):
+    if float(np.mean(plain.relative)) < _GOOD_ENOUGH:
         return "", None
     n = len(plain.relative)
     found: list[tuple[Reading, float]] = []

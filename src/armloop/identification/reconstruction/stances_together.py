@@ -27,8 +27,9 @@ from armloop.util.arrays import Array
 #: What is kept beside the others lowers the relative errors (geometric mean of all joints) by this factor: a zero of which
 #: nothing tells came to 1.000, those of a measured Panda whose URDF was turned at five joints by 0.05 rad to 1.07 and more.
 _ADDS = 1.02
-#: Gauss-Newton steps: how many at first, and after one is left out; none longer than this, until they are so short, rad.
-_STEPS, _AGAIN, _LONGEST, _SHORT = 8, 4, 0.2, 1e-5
+#: Gauss-Newton steps: after how many something must be explained by them, how many further ones, and how many after one is
+#: left out; none longer than this, until they are so short, rad.
+_FIRST, _FURTHER, _AGAIN, _LONGEST, _SHORT = 2, 6, 4, 0.2, 1e-5
 
 
 class _Estimate(NamedTuple):
@@ -51,10 +52,10 @@ def together(problem: PlainFits, plain: Fit, found: Sequence[Stance] = ()) -> li
     level = _level(problem)
     zeros = (ZeroOffset(j, 0.0, 0.0) for j in np.flatnonzero(problem.arm.revolute[: n - 1]).tolist())
     begun = [known.get(one.place, one) for one in (*level, *zeros)]
-    first, given = few.left(), _estimated(few, begun, _STEPS)
-    if first.over(given.fit) < PROMISING:
+    first = _estimated(few, begun, _FIRST)
+    if few.left().over(first.fit) < PROMISING:
         return []
-    kept = _eliminated(few, given)
+    kept = _eliminated(few, _estimated(few, first.stances, _FURTHER))
     if not kept:
         return []
     stances = _estimated(problem, kept, _AGAIN).stances

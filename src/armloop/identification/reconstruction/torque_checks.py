@@ -21,7 +21,7 @@ from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
 from armloop.identification.reconstruction.bandwidth import determined_solution
 from armloop.identification.reconstruction.plain_fits import FAR, GOOD, Fit, PlainFits
-from armloop.identification.reconstruction.readings import meant, well_explained
+from armloop.identification.reconstruction.readings import meant
 from armloop.identification.reconstruction.stances import Stance, as_it_stands
 from armloop.identification.reconstruction.stances_together import together
 from armloop.identification.reconstruction.systematic_sample import placed_runs
@@ -90,8 +90,6 @@ def _otherwise(
     problem: PlainFits, logs: list[MotionLog], cutoff_hz: float, plain: Fit
 ) -> tuple[str, list[Stance]]:
     """What is wrong with a record that is meant otherwise, if anything is; and by what the arm stands slightly otherwise."""
-    if well_explained(plain):
-        return "", []
     found: list[Stance] = []
     stood, left = problem, plain
     while len(found) < _MOST:
