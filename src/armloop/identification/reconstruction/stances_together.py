@@ -59,7 +59,7 @@ def together(problem: PlainFits, plain: Fit, found: Sequence[Stance] = ()) -> li
     if not kept:
         return []
     stances = _estimated(problem, kept, _AGAIN).stances
-    if not all(stance.slight and stance.clearness > 1 for stance in stances):
+    if not all(stance.slight for stance in stances):
         return []
     other = problem.as_of(as_it_stands(problem.arm, stances)).fit(np.ones(n), np.arange(n))
     return stances if earned(problem, plain, other) else []
