@@ -31,6 +31,8 @@ _DIRECTIONS = [np.array(axes) / np.linalg.norm(axes) for axes in product((0, 1, 
 _ANY = 1.1
 #: A base that leans does so by more than the first angle, which is how level one is set up, and less than the second, rad.
 _LEVEL, _LEANS = np.radians(1.0), 0.35
+#: It may seem to be by so many standard errors more.
+_UNSURE = 2.0
 #: It must be seen by so many standard errors, explain all torques so many times as well (geometric mean) and the worst joint
 #: by the third: measured arms that stand level came to 1.07 and 0.93; an encoder's zero that is off by 0.05 rad to 1.15 and
 #: 0.5. Springs at every joint must explain less, in logarithms by this factor: on short strokes they are as good.
@@ -66,7 +68,7 @@ class Mounting:
     @property
     def slight(self) -> bool:
         """Whether the base only leans."""
-        return self.lean is not None and self.angle < _LEANS
+        return self.lean is not None and self.angle - _UNSURE * self.lean.std_error < _LEANS
 
     @property
     def place(self) -> str:
@@ -125,11 +127,12 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
     leans = [refined(few, given).down]
     if found is not None:
         # from a level base the torques of upright axes, as a SCARA's, have no slope; and where it leans they hang as well
-        leans.append(
-            nearby(lambda down: quickly(down) if down @ given > np.cos(_LEANS) else _NOT_AT_ALL, given)
-        )
+        leans += [
+            nearby(lambda down: quickly(down) if down @ given > np.cos(_LEANS) else _NOT_AT_ALL, given),
+            found - 2 * (found @ given) * given,
+        ]
     near = [refined(problem, lean) for lean in leans if quickly(lean) > PROMISING]
-    near = [one for one in near if one.beside(given) < _LEANS]
+    near = [one for one in near if one.beside(given) - _UNSURE * one.std_error < _LEANS]
     lean = max(near, key=lambda one: times(one.down), default=None)
     if lean is not None and (found is None or times(lean.down) >= AS_GOOD * times(found)):
         leaning = Mounting.leaning(lean, given)

@@ -39,20 +39,16 @@ class _Estimate(NamedTuple):
     fit: Fit
 
 
-def together(problem: PlainFits, plain: Fit, found: Sequence[Stance] = ()) -> list[Stance]:
+def together(problem: PlainFits, plain: Fit) -> list[Stance]:
     """How the base leans and which joints' zeros are off, each beside all others; none unless all of them are slight.
 
     Args:
         problem: what is regressed of the record as it stands.
         plain: what is left of it.
-        found: what is known already, to begin from.
     """
     n, few = problem.arm.n, problem.every(SCREENED)
-    known = {stance.place: stance for stance in found}
-    level = _level(problem)
     zeros = (ZeroOffset(j, 0.0, 0.0) for j in np.flatnonzero(problem.arm.revolute[: n - 1]).tolist())
-    begun = [known.get(one.place, one) for one in (*level, *zeros)]
-    first = _estimated(few, begun, _FIRST)
+    first = _estimated(few, [*_level(problem), *zeros], _FIRST)
     if few.left().over(first.fit) < PROMISING:
         return []
     kept = _eliminated(few, _estimated(few, first.stances, _FURTHER))

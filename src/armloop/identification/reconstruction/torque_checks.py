@@ -99,7 +99,7 @@ def _otherwise(
         found.append(stance)
         stood = stance.read(stood)
         left = stood.fit(np.ones(problem.arm.n), np.arange(problem.arm.n))
-    if all_of_them := together(problem, plain, found):
+    if all_of_them := together(problem, plain):
         found = all_of_them
         if wrong:
             stood = problem.as_of(as_it_stands(problem.arm, found))
