@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,10 @@ from armloop.robot.arm import Arm, load_arm
 from armloop.robot.kinematics import nominal_parameters
 from armloop.robot.levelling import base_rotation, levelled, roll_and_pitch, say_other_stance, turning
 from armloop.robot.newton_euler import joint_torques
+from armloop.util.arrays import Array
 from armloop.util.errors import InputWarning
+
+URDF = Path(__file__).parents[2] / "urdf"
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -75,3 +79,26 @@ def test_another_zero_is_the_same_arm_further_on(name: str) -> None:
     again = Arm.from_dict(off.to_dict())
     np.testing.assert_array_equal(again.zeros, off.zeros)
     assert again.fingerprint() == arm.fingerprint() and "zeros" not in arm.to_dict()
+
+
+def test_a_base_that_is_turned_already_is_turned_on_top_of_that(tmp_path: Path) -> None:
+    def fixed_by(rpy: Array) -> Arm:
+        text = (URDF / "three_axis.urdf").read_text()
+        origin = " ".join(map(repr, rpy.tolist()))
+        world = (
+            '<link name="world"/><joint name="fix" type="fixed"><parent link="world"/><child link="base"/>'
+            f'<origin rpy="{origin}"/></joint></robot>'
+        )
+        (tmp_path / "arm.urdf").write_text(text.replace("</robot>", world))
+        return load_arm(tmp_path / "arm.urdf")
+
+    already = np.array([0.4, -0.3, 0.9])
+    arm = fixed_by(already)
+    leaning = replace(arm, gravity=base_rotation(0.1, -0.2).T @ arm.gravity)
+    on_top = base_rotation(*roll_and_pitch(leaning.gravity)) @ Rotation.from_euler("xyz", already).as_matrix()
+    mended = fixed_by(Rotation.from_matrix(on_top).as_euler("xyz"))
+    q, v, vdot = np.random.default_rng(1).normal(size=(3, 20, arm.n))
+    links = nominal_parameters(arm)
+    np.testing.assert_allclose(
+        joint_torques(mended, links, q, v, vdot), joint_torques(leaning, links, q, v, vdot), atol=1e-10
+    )

@@ -88,7 +88,10 @@ def vector(components: Sequence[float], digits: int) -> str:
 def turning(gravity: Array) -> str:
     """How a URDF says that gravity acts along a direction (3,) of the base frame."""
     angles = "{:.4f} {:.4f}".format(*roll_and_pitch(gravity))
-    return f'turn the base in the URDF (origin rpy="{angles} 0" of the joint that fixes it to the world)'
+    return (
+        f'turn the base in the URDF (origin rpy="{angles} 0" of the joint that fixes it to the world; where that is turned '
+        "already, this turn comes on top, about the world's axes)"
+    )
 
 
 def levelled(arm: Arm) -> Arm:
