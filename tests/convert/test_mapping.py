@@ -148,6 +148,10 @@ BAD_MAPS = {
     "range": ("time: {column: t}\nq: {columns: 'q{1..999999999}'}\ntau: {columns: [b]}", "1 to 16 joints"),
     "no range": ("time: {column: t}\nq: {columns: 'q{3..1}'}\ntau: {columns: [b]}", "1 to 16 joints"),
     "twice": ("time: {column: t}\nq: {columns: [a]}\nq: {columns: [b]}\ntau: {columns: [b]}", "stands twice"),
+    "a joint twice": (
+        "time: {column: t}\nq: {columns: [a, b]}\ntau: {columns: [c, d]}\njoints: [x, x]",
+        "joints: x stands twice",
+    ),
     "a list": ("- a\n- b", "mapping of fields"),
     "no yaml": ("time: {column: [", "map.yaml"),
     "no column": (

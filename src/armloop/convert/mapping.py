@@ -133,6 +133,12 @@ def check_map(mapping: Mapping, where: str) -> None:
         raise InputError(
             f"{where}: joints: {len(mapping.joints)} names for {n} columns of q; give one per column"
         )
+    joints = mapping.joints or []
+    for name in joints:
+        if joints.count(name) > 1:
+            raise InputError(
+                f"{where}: joints: {name} stands twice; give each joint of the arm once, base to tip"
+            )
     for name, quantity in mapping.quantities().items():
         if len(quantity.names()) != n:
             raise InputError(
