@@ -46,12 +46,13 @@ class Direction:
     def standardised(self, other: Array) -> float:
         """The angle to another direction near this one in standard deviations; of a side that nothing shows, none."""
         off = self.across @ (other - self.down)
-        return float(np.sqrt(off @ np.linalg.pinv(self.covariance) @ off))
+        # of a direction that hardly anything shows rounding leaves no covariance
+        return float(np.sqrt(max(float(off @ np.linalg.pinv(self.covariance) @ off), 0.0)))
 
     @property
     def std_error(self) -> float:
         """Standard error of the direction where it is known worst, rad."""
-        return float(np.sqrt(np.linalg.eigvalsh(self.covariance)[-1]))
+        return float(np.sqrt(max(float(np.linalg.eigvalsh(self.covariance)[-1]), 0.0)))
 
 
 def refined(problem: PlainFits, down: Array) -> Direction:

@@ -35,8 +35,6 @@ _DRIVES = 0.5
 _BETTER = 2.0
 #: In two halves of the data a gain that is far off must be the same but for this factor.
 _ALIKE = 1.5
-#: So many ways of standing slightly otherwise are looked for.
-_MOST = 4
 
 
 def check_torques(
@@ -90,21 +88,12 @@ def _otherwise(
     problem: PlainFits, logs: list[MotionLog], cutoff_hz: float, plain: Fit
 ) -> tuple[str, list[Stance]]:
     """What is wrong with a record that is meant otherwise, if anything is; and by what the arm stands slightly otherwise."""
-    found: list[Stance] = []
-    stood, left = problem, plain
-    while len(found) < _MOST:
-        wrong, stance = meant(stood, logs, cutoff_hz, left)
-        if wrong or stance is None or stance.place in {one.place for one in found}:
-            break
-        found.append(stance)
-        stood = stance.read(stood)
+    wrong, stance = meant(problem, logs, cutoff_hz, plain)
+    found = together(problem, plain) or ([stance] if stance else [])
+    if wrong and found:
+        stood = problem.as_of(as_it_stands(problem.arm, found))
         left = stood.fit(np.ones(problem.arm.n), np.arange(problem.arm.n))
-    if all_of_them := together(problem, plain):
-        found = all_of_them
-        if wrong:
-            stood = problem.as_of(as_it_stands(problem.arm, found))
-            left = stood.fit(np.ones(problem.arm.n), np.arange(problem.arm.n))
-            wrong, _ = meant(stood, logs, cutoff_hz, left)
+        wrong, _ = meant(stood, logs, cutoff_hz, left)
     return wrong, found
 
 
