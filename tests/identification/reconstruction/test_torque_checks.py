@@ -172,6 +172,26 @@ class TestWhole:
         assert "columns tau1 and tau3 are exchanged" in self.check("a")
 
 
+@pytest.mark.parametrize("still", ["", "they are exchanged"])
+@pytest.mark.parametrize("slight", [True, False])
+def test_what_is_wrong_is_asked_once_more_of_the_arm_as_it_stands(
+    slight: bool, still: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Several zeros that are a little off may look like one that is far off, or like other columns."""
+    arm = SimpleNamespace(n=1)
+    stands: Any = SimpleNamespace(fit=lambda signs, order: "as it stands")
+    problem: Any = SimpleNamespace(arm=arm, as_of=lambda of: stands if of == "off" else None)
+    found: Any = [SimpleNamespace(of=lambda of: "off" if of is arm else None)] if slight else []
+    monkeypatch.setattr(torque_checks, "together", lambda problem, plain: found)
+    said = {"plain": ("they are exchanged", None), "as it stands": (still, None)}
+    monkeypatch.setattr(torque_checks, "meant", lambda of, logs, cutoff_hz, left: said[left])
+    plain: Any = "plain"
+    assert torque_checks._otherwise(problem, [], 8.0, plain) == (
+        still if slight else "they are exchanged",
+        found,
+    )
+
+
 class Fits(torque_checks.Problem):
     """Fits that are given: by the joints whose sign is turned, by their order, and by the half of the blocks."""
 

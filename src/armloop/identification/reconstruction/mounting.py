@@ -70,11 +70,6 @@ class Mounting:
         """Whether the base only leans."""
         return self.lean is not None and self.angle - _UNSURE * self.lean.std_error < _LEANS
 
-    @property
-    def place(self) -> str:
-        """What stands otherwise."""
-        return "base"
-
     def read(self, problem: PlainFits) -> PlainFits:
         """What is regressed of a record of the arm that is mounted so."""
         return problem.under(self.down)

@@ -47,11 +47,6 @@ class ZeroOffset:
         """How many times as far off as what would not be seen."""
         return abs(self.angle) / max(_EXACT, _SEEN * self.std_error)
 
-    @property
-    def place(self) -> int:
-        """What stands otherwise."""
-        return self.joint
-
     def read(self, problem: PlainFits) -> PlainFits:
         """What is regressed of a record of the arm with this zero."""
         return problem.as_of(self.of(problem.arm))
