@@ -17,9 +17,10 @@ from armloop.api.model import load_model as api_load
 from armloop.data.log import MotionLog, read_log
 from armloop.data.signals import preprocess
 from armloop.identification.reconstruction import Options, mounting, reconstruct
-from armloop.identification.reconstruction.gravity_direction import Direction, refined
+from armloop.identification.reconstruction.gravity_direction import Direction
 from armloop.identification.reconstruction.mounting import Mounting, earned
 from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
+from armloop.identification.reconstruction.stance_angles import refined
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import score
 from armloop.model import load_model
@@ -245,7 +246,8 @@ def test_a_lean_is_more_than_a_degree_and_its_error(
         left=lambda: plain,
     )
     problem.every = lambda step: problem
-    monkeypatch.setattr(mounting, "refined", lambda problem, first: found)
+    leaning_so = mounting.Mounting.leaning(found, np.array([0.0, 0.0, -1.0]))
+    monkeypatch.setattr(mounting, "refined", lambda problem, first: [leaning_so])
     monkeypatch.setattr(mounting, "nearby", lambda times, first: down)
     told = mounting.other_mounting(problem, plain)
     assert (told is not None and told.slight) is (taken is True)
@@ -271,6 +273,8 @@ def test_errors_of_a_direction_are_as_large_as_disturbances_that_last_make_them(
         log = recorded(motion, tau + 0.05 * np.mean(np.abs(tau), axis=0) * lasting, seed)
         problem = PlainFits.of([log], arm, 10.0)
         assert problem is not None
-        sizes.append(refined(problem, given).standardised(given))
+        (leaning,) = refined(problem, [mounting.Mounting(given)])
+        assert leaning.lean is not None
+        sizes.append(leaning.lean.standardised(given))
     # of two independent standardised angles: root two
     assert 0.5 < np.sqrt(np.mean(np.square(sizes)) / 2) < 2.0

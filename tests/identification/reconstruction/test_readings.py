@@ -15,7 +15,7 @@ from armloop.identification.reconstruction import readings as readings_module
 from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
 from armloop.identification.reconstruction.readings import Reading, meant, readings
 from armloop.identification.reconstruction.torque_checks import check_torques
-from armloop.robot.arm import load_arm
+from armloop.robot.arm import Arm, load_arm
 from armloop.util.arrays import Array, Index
 from armloop.util.errors import LogError
 
@@ -227,6 +227,9 @@ class Given:
 
     def sprung(self) -> Any:
         return self._left("springs") or self._left("plain")
+
+    def as_of(self, arm: Arm) -> Any:
+        return self.under(arm.gravity / np.linalg.norm(arm.gravity))
 
     def under(self, down: Array) -> Any:
         return (self._left("up") if down[2] > 0.99 else None) or self._left("plain")

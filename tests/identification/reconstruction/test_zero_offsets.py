@@ -98,9 +98,10 @@ def test_a_zero_is_off_by_more_than_its_error_and_another_one_by_more_than_a_thi
     """And by none where springs at the joints explain as much."""
     asked = set()
 
-    def refined(problem: Any, joint: int, start: float) -> ZeroOffset:
-        asked.add(joint)
-        return ZeroOffset(joint, angle if joint == 1 else 0.0, error)
+    def refined(problem: Any, stances: list[ZeroOffset]) -> list[ZeroOffset]:
+        (own,) = stances
+        asked.add(own.joint)
+        return [ZeroOffset(own.joint, angle if own.joint == 1 else 0.0, error)]
 
     errors = {
         False: Fit(*np.array([[0.3] * 4, [1.0] * 4, [1.0] * 4])),
@@ -118,7 +119,7 @@ def test_a_zero_is_off_by_more_than_its_error_and_another_one_by_more_than_a_thi
         left=lambda: errors[False],
     )
     problem.every = lambda step: problem
-    monkeypatch.setattr(zero_offsets, "_refined", refined)
+    monkeypatch.setattr(zero_offsets, "refined", refined)
     found = zero_offsets.other_zero(problem, errors[False])
     # what slides has no zero that torques tell, nor has the last joint
     assert asked == {0, 1}

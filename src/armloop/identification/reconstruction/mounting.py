@@ -8,11 +8,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from armloop.identification.reconstruction.gravity_direction import Direction, nearby, refined
+from armloop.identification.reconstruction.gravity_direction import (
+    Direction,
+    across_of,
+    gravity_slopes,
+    nearby,
+)
 from armloop.identification.reconstruction.plain_fits import (
     AS_GOOD,
     PROMISING,
@@ -20,7 +25,8 @@ from armloop.identification.reconstruction.plain_fits import (
     Fit,
     PlainFits,
 )
-from armloop.robot.arm import Arm
+from armloop.identification.reconstruction.stance_angles import refined
+from armloop.robot.arm import STANDARD_GRAVITY, Arm
 from armloop.robot.levelling import of_a_lean, turning, vector
 from armloop.util.arrays import Array
 
@@ -58,6 +64,7 @@ class Mounting:
     lean: Direction | None = None
     angle: float = 0.0
     clearness: float = 0.0
+    kind: ClassVar[Literal["leaning"]] = "leaning"
 
     @classmethod
     def leaning(cls, found: Direction, given: Array) -> Mounting:
@@ -70,13 +77,21 @@ class Mounting:
         """Whether the base only leans."""
         return self.lean is not None and self.angle - _UNSURE * self.lean.std_error < _LEANS
 
-    def read(self, problem: PlainFits) -> PlainFits:
-        """What is regressed of a record of the arm that is mounted so."""
-        return problem.under(self.down)
-
     def of(self, arm: Arm) -> Arm:
-        """The arm under gravity along this direction."""
-        return replace(arm, gravity=float(np.linalg.norm(arm.gravity)) * self.down)
+        """The arm under gravity along this direction, the standard one where its URDF has none."""
+        g = float(np.linalg.norm(arm.gravity) or np.linalg.norm(STANDARD_GRAVITY))
+        return replace(arm, gravity=g * self.down)
+
+    def slopes(self, problem: PlainFits, links: Array) -> Array:
+        """(N, n, 2) torques per radian by which gravity turns across this direction, of links (10 n,)."""
+        return gravity_slopes(problem, links, across_of(self.down))
+
+    def moved(self, arm: Arm, off: Array, covariance: Array) -> Mounting:
+        """A base that leans further by angles (2,)."""
+        across = across_of(self.down)
+        down = self.down + off @ across
+        found = Direction(down / np.linalg.norm(down), across, covariance)
+        return Mounting.leaning(found, arm.gravity / np.linalg.norm(arm.gravity))
 
     def to_dict(self) -> dict[str, Any]:
         """What a model of an arm whose base leans keeps of it."""
@@ -119,20 +134,18 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
     found = nearby(times, best) if quickly(best) > _ANY else None
     if given is None:
         return None if found is None else Mounting(found)
-    leans = [refined(few, given).down]
+    leans = [one.down for one in refined(few, [Mounting(given)])]
     if found is not None:
         # from a level base the torques of upright axes, as a SCARA's, have no slope; and where it leans they hang as well
         leans += [
             nearby(lambda down: quickly(down) if down @ given > np.cos(_LEANS) else _NOT_AT_ALL, given),
             found - 2 * (found @ given) * given,
         ]
-    near = [refined(problem, lean) for lean in leans if quickly(lean) > PROMISING]
-    near = [one for one in near if one.beside(given) - _UNSURE * one.std_error < _LEANS]
-    lean = max(near, key=lambda one: times(one.down), default=None)
+    near = [one for lean in leans if quickly(lean) > PROMISING for one in refined(problem, [Mounting(lean)])]
+    lean = max((one for one in near if one.slight), key=lambda one: times(one.down), default=None)
     if lean is not None and (found is None or times(lean.down) >= AS_GOOD * times(found)):
-        leaning = Mounting.leaning(lean, given)
         other = problem.under(lean.down).fit(ones, as_given)
-        return leaning if leaning.clearness > 1 and earned(problem, plain, other) else None
+        return lean if lean.clearness > 1 and earned(problem, plain, other) else None
     return None if found is None else Mounting(found)
 
 

@@ -83,7 +83,7 @@ class Reading(NamedTuple):
     def problem(self, plain: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float) -> PlainFits | None:
         """What is regressed of the record, read so; None where there is too little motion."""
         if self.stance is not None:
-            return self.stance.read(plain)
+            return plain.as_of(self.stance.of(plain.arm))
         if not self.unit:
             return plain.read(self.order, self.signs)
         # a law of friction that is met badly may be met better at other speeds, and says nothing of a unit

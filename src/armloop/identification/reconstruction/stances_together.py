@@ -6,30 +6,22 @@ angles, one seems to be off by the difference, and a base that leans to be a zer
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from armloop.identification.reconstruction.gravity_direction import (
-    Direction,
-    across_of,
-    gauss_newton,
-    gravity_slopes,
-)
 from armloop.identification.reconstruction.mounting import Mounting, earned
 from armloop.identification.reconstruction.plain_fits import PROMISING, SCREENED, Fit, PlainFits
+from armloop.identification.reconstruction.stance_angles import refined
 from armloop.identification.reconstruction.stances import Stance, as_it_stands
-from armloop.identification.reconstruction.zero_offsets import ZeroOffset, zero_slopes
-from armloop.util.arrays import Array
+from armloop.identification.reconstruction.zero_offsets import ZeroOffset
 
 #: What is kept beside the others lowers the relative errors (geometric mean of all joints) by this factor: a zero of which
 #: nothing tells came to 1.000, those of a measured Panda whose URDF was turned at five joints by 0.05 rad to 1.07 and more.
 _ADDS = 1.02
 #: Gauss-Newton steps: after how many something must be explained by them, how many further ones, and how many after one is
-#: left out; none longer than this, until they are so short, rad.
-_FIRST, _FURTHER, _AGAIN, _LONGEST, _SHORT = 2, 6, 4, 0.2, 1e-5
+#: left out.
+_FIRST, _FURTHER, _AGAIN = 2, 6, 4
 
 
 class _Estimate(NamedTuple):
@@ -89,44 +81,5 @@ def _but(estimate: _Estimate, k: int) -> list[Stance]:
 
 def _estimated(problem: PlainFits, stances: list[Stance], steps: int) -> _Estimate:
     """They, moved to where most is explained, and what that leaves."""
-    for _ in range(steps if stances else 0):
-        off, covariance = gauss_newton(
-            problem.as_of(as_it_stands(problem.arm, stances)),
-            partial(_slopes, stances),
-        )
-        off = np.clip(off, -_LONGEST, _LONGEST)
-        stances = _moved(problem, stances, off, covariance)
-        if np.max(np.abs(off)) < _SHORT:
-            break
+    stances = refined(problem, stances, steps)
     return _Estimate(stances, problem.as_of(as_it_stands(problem.arm, stances)).left())
-
-
-def _slopes(stances: Sequence[Stance], problem: PlainFits, links: Array) -> Array:
-    """(N, n, k) torques per radian of each angle of the stances."""
-    slopes = (
-        gravity_slopes(problem, links, across_of(one.down))
-        if isinstance(one, Mounting)
-        else zero_slopes(problem, links, one.joint)
-        for one in stances
-    )
-    return np.concatenate(list(slopes), axis=2)
-
-
-def _moved(problem: PlainFits, stances: list[Stance], off: Array, covariance: Array) -> list[Stance]:
-    """They, further by angles (k,), with the errors of these."""
-    moved: list[Stance] = []
-    at = 0
-    for stance in stances:
-        if isinstance(stance, Mounting):
-            own, across = slice(at, at + 2), across_of(stance.down)
-            down = stance.down + off[own] @ across
-            direction = Direction(down / np.linalg.norm(down), across, covariance[own, own])
-            moved.append(
-                Mounting.leaning(direction, problem.arm.gravity / np.linalg.norm(problem.arm.gravity))
-            )
-            at += 2
-        else:
-            angle = float((stance.angle + off[at] + np.pi) % (2 * np.pi) - np.pi)
-            moved.append(ZeroOffset(stance.joint, angle, float(np.sqrt(max(covariance[at, at], 0.0)))))
-            at += 1
-    return moved

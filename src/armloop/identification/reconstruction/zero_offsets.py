@@ -7,13 +7,13 @@ from another side than its positions say. Of the last joint nothing tells, nor o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from armloop.identification.reconstruction.gravity_direction import gauss_newton
 from armloop.identification.reconstruction.mounting import earned
 from armloop.identification.reconstruction.plain_fits import PROMISING, SCREENED, Fit, PlainFits
+from armloop.identification.reconstruction.stance_angles import refined
 from armloop.robot.arm import Arm
 from armloop.robot.levelling import of_a_zero, of_another_zero
 from armloop.robot.newton_euler import joint_torques
@@ -21,8 +21,6 @@ from armloop.util.arrays import Array
 
 #: Other zeros that are tried, rad.
 _STARTS = (np.pi / 2, -np.pi / 2, np.pi)
-#: Gauss-Newton steps: how many, none longer than this, until they are so short, rad.
-_STEPS, _LONGEST, _SHORT = 6, 0.4, 1e-5
 #: A zero is off by more than this, and by so many standard errors; from the next on it is another one, rad.
 _EXACT, _SEEN, OTHER = 0.01, 5.0, 0.35
 #: Of the difference that a slope is made of, rad.
@@ -36,6 +34,7 @@ class ZeroOffset:
     joint: int
     angle: float
     std_error: float
+    kind: ClassVar[Literal["zeros"]] = "zeros"
 
     @property
     def slight(self) -> bool:
@@ -47,13 +46,23 @@ class ZeroOffset:
         """How many times as far off as what would not be seen."""
         return abs(self.angle) / max(_EXACT, _SEEN * self.std_error)
 
-    def read(self, problem: PlainFits) -> PlainFits:
-        """What is regressed of a record of the arm with this zero."""
-        return problem.as_of(self.of(problem.arm))
-
     def of(self, arm: Arm) -> Arm:
         """The arm with this zero."""
         return arm.with_zero(self.joint, self.angle)
+
+    def slopes(self, problem: PlainFits, links: Array) -> Array:
+        """(N, n, 1) torques per radian by which the joint is further than its position says, of links (10 n,)."""
+        m = problem.table.motion
+        there, back = (
+            joint_torques(problem.arm.with_zero(self.joint, h), links, m.q, m.v, m.vdot)
+            for h in (_STEP, -_STEP)
+        )
+        return np.asarray((there - back)[:, :, None] / (2 * _STEP))
+
+    def moved(self, arm: Arm, off: Array, covariance: Array) -> ZeroOffset:
+        """The zero, further by an angle (1,)."""
+        angle = float((self.angle + off[0] + np.pi) % (2 * np.pi) - np.pi)
+        return ZeroOffset(self.joint, angle, float(np.sqrt(max(covariance[0, 0], 0.0))))
 
     def to_dict(self) -> dict[str, Any]:
         """What a model of the arm keeps of it, the joint from 1."""
@@ -86,33 +95,11 @@ def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
     for joint in np.flatnonzero(problem.arm.revolute[: n - 1]).tolist():
         starts = [0.0, max(_STARTS, key=lambda start: quickly(joint, start))]
         for start in starts if quickly(joint, starts[1]) > PROMISING else starts[:1]:
-            offset = _refined(few, joint, start)
+            (offset,) = refined(few, [ZeroOffset(joint, start, np.inf)])
             if abs(offset.angle) < _EXACT or quickly(joint, offset.angle) < PROMISING:
                 continue
-            offset = _refined(problem, joint, offset.angle)
-            other = offset.read(problem).fit(np.ones(n), np.arange(n))
+            (offset,) = refined(problem, [offset])
+            other = problem.as_of(offset.of(problem.arm)).fit(np.ones(n), np.arange(n))
             if offset.clearness > 1 and earned(problem, plain, other):
                 tried.append((plain.over(other), offset))
     return max(tried, key=lambda one: one[0])[1] if tried else None
-
-
-def _refined(problem: PlainFits, joint: int, angle: float) -> ZeroOffset:
-    """The zero near an angle that explains most, by Gauss-Newton steps."""
-
-    for _ in range(_STEPS):
-        there = problem.as_of(problem.arm.with_zero(joint, angle))
-        off, covariance = gauss_newton(there, lambda of, links: zero_slopes(of, links, joint))
-        step = float(np.clip(off[0], -_LONGEST, _LONGEST))
-        angle += step
-        if abs(step) < _SHORT:
-            break
-    return ZeroOffset(joint, float((angle + np.pi) % (2 * np.pi) - np.pi), float(np.sqrt(covariance[0, 0])))
-
-
-def zero_slopes(problem: PlainFits, links: Array, joint: int) -> Array:
-    """(N, n, 1) torques per radian by which a joint is further than its position says, of links (10 n,)."""
-    m = problem.table.motion
-    there, back = (
-        joint_torques(problem.arm.with_zero(joint, h), links, m.q, m.v, m.vdot) for h in (_STEP, -_STEP)
-    )
-    return np.asarray((there - back)[:, :, None] / (2 * _STEP))
