@@ -22,6 +22,7 @@ from armloop.identification.reconstruction.mounting import Mounting, earned
 from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
 from armloop.identification.reconstruction.stance_angles import refined
 from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.identification.reconstruction.zero_offsets import ZeroOffset
 from armloop.identification.scoring import score
 from armloop.model import load_model
 from armloop.robot.arm import Arm, load_arm
@@ -158,6 +159,31 @@ def test_what_is_held_out_says_nothing_of_how_the_arm_stands() -> None:
     assert not other or not np.allclose(other[0].of(three_axis()).gravity, leaning.gravity, atol=0.1)
     # and where nothing else is left, nothing is said
     assert check_torques([log], three_axis(), 10.0, [np.array([[0.0, 39.0]])]) == []
+
+
+def test_what_is_not_found_again_leaves_the_urdfs_arm_and_its_filter(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = sys.modules[reconstruct.__module__]
+    answers: list[list[Any]] = [[ZeroOffset(1, 0.1, 0.001)], []]
+    arms: list[Arm] = []
+    usual = module.prepared  # type: ignore[attr-defined]
+
+    def spied(logs: Any, kept: Any, **how: Any) -> Any:
+        arms.append(how["arm"])
+        return usual(logs, kept, **how)
+
+    monkeypatch.setattr(module, "check_torques", lambda *given: answers.pop(0))
+    monkeypatch.setattr(module, "prepared", spied)
+    options, said = Options(parts=False, standard_errors=False), []
+    found = reconstruct(
+        [three_axes(seed, three_axis(), 0.3) for seed in (1, 2)],
+        three_axis(),
+        library="rigid-body",
+        options=options,
+        progress=said.append,
+    )
+    assert not answers and "zeros" not in found.model.history
+    assert [list(arm.zeros) for arm in arms] == [[], [0.0, 0.1, 0.0], []]
+    assert any("whether the torques are this arm's" in one for one in said)
 
 
 def test_a_model_is_reconstructed_on_what_stands_aside(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,6 @@
 """A record whose joints stand in another order, or whose angles are in another unit, is told by what it explains."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,8 +15,9 @@ from armloop.identification.reconstruction import readings as readings_module
 from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
 from armloop.identification.reconstruction.readings import Reading, meant, readings
 from armloop.identification.reconstruction.torque_checks import check_torques
-from armloop.robot.arm import Arm, load_arm
-from armloop.util.arrays import Array, Index
+from armloop.identification.reconstruction.zero_offsets import ZeroOffset
+from armloop.robot.arm import load_arm
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import LogError
 
 
@@ -32,10 +33,22 @@ def misread(log: MotionLog, order: list[int], factor: float = 1.0) -> MotionLog:
     return unchecked_log(time=log.time, q=factor * q, v=factor * v, tau=tau, name=log.name)
 
 
+@dataclass
+class Kinds:
+    """A weightless arm that is known by the kinds of its joints, and how it stands otherwise."""
+
+    n: int
+    revolute: Mask
+    gravity: Array
+    zeros: tuple[tuple[int, float], ...] = ()
+
+    def with_zero(self, joint: int, angle: float) -> "Kinds":
+        return replace(self, zeros=(*self.zeros, (joint, angle)))
+
+
 def arm_of(kinds: str) -> Any:
-    """A weightless arm that is known by the kinds of its joints, R or P."""
-    revolute = np.array([kind == "R" for kind in kinds])
-    return SimpleNamespace(n=len(kinds), revolute=revolute, gravity=np.zeros(3))
+    """Of joints R or P."""
+    return Kinds(len(kinds), np.array([kind == "R" for kind in kinds]), np.zeros(3))
 
 
 def orders(kinds: str) -> list[list[int]]:
@@ -228,8 +241,9 @@ class Given:
     def sprung(self) -> Any:
         return self._left("springs") or self._left("plain")
 
-    def as_of(self, arm: Arm) -> Any:
-        return self.under(arm.gravity / np.linalg.norm(arm.gravity))
+    def as_of(self, arm: Kinds) -> Any:
+        turned = self._left("zero") if arm.zeros else None
+        return turned or self.under(arm.gravity / np.linalg.norm(arm.gravity))
 
     def under(self, down: Array) -> Any:
         return (self._left("up") if down[2] > 0.99 else None) or self._left("plain")
@@ -243,7 +257,8 @@ def chosen(plain: Fit, others: dict[str, Fit], monkeypatch: pytest.MonkeyPatch) 
     """What is said of a record of two joints."""
     given: Any = Given(plain, others)
     monkeypatch.setattr(PlainFits, "of", given.of)
-    monkeypatch.setattr(readings_module, "other_zero", lambda problem, plain: None)
+    zero = ZeroOffset(0, np.pi / 2, 0.01) if "zero" in others else None
+    monkeypatch.setattr(readings_module, "other_zero", lambda problem, plain: zero)
     q = np.zeros((3, len(plain.relative)))
     log = unchecked_log(time=np.arange(3.0), q=q, v=q, tau=q, name="run")
     return meant(given, [log], 10.0, plain)[0]
@@ -304,6 +319,9 @@ def test_an_arm_that_hangs_may_be_its_mirror_image(monkeypatch: pytest.MonkeyPat
     )
     assert said.count("; or") == 1
     assert "; or" not in chosen(plain, {"up": hangs}, monkeypatch)
+    # a joint with another zero is not
+    said = chosen(plain, {"zero": hangs, "1, 2": fit_of([0.1, 0.1])}, monkeypatch)
+    assert "joint 1 counts from another zero" in said and "; or" not in said
 
 
 @pytest.mark.parametrize(("joints", "sets"), [(2, 3), (6, 63), (7, 127), (8, 8 + 28)])

@@ -198,4 +198,5 @@ def meant(
         return "", reading.stance
     # an arm that hangs is its own mirror image, whose joints turn the other way
     others = [f"; or {other.which()} against the URDF's axes" for other, _ in near if other.turned]
-    return reading.words(times) + "".join(others[:1] if reading.stance else []), None
+    hangs = reading.stance is not None and reading.stance.kind == "leaning"
+    return reading.words(times) + "".join(others[:1] if hangs else []), None

@@ -176,12 +176,15 @@ def reconstruct(
         prepared, logs, kept, usual=usual, given=conditioning, options=settings, progress=progress
     )
     ready = preparing(arm=arm, corrected=method != REFERENCE)
+    progress("whether the torques are this arm's")
     stances = check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz, ready.aside)
     if stances:
         progress("the arm stands slightly otherwise than its URDF says: anew as it stands")
         ready = preparing(arm=as_it_stands(arm, stances), corrected=method != REFERENCE)
         # other blocks may be held out now
         stances = check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz, ready.aside)
+        if not stances:
+            ready = preparing(arm=arm, corrected=method != REFERENCE)
         arm = as_it_stands(arm, stances)
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
