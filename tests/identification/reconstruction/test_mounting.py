@@ -28,6 +28,9 @@ from armloop.model import load_model
 from armloop.robot.arm import Arm, load_arm
 from armloop.util.errors import LogError
 
+#: What takes long in sum, of many like it.
+LONG = pytest.mark.long
+
 
 def leaning_of(logs: Sequence[MotionLog], arm: Arm, cutoff_hz: float) -> Mounting | None:
     """How the base leans, and that nothing else is off."""
@@ -75,8 +78,10 @@ def test_a_level_base_does_not_lean_whatever_else_acts(seed: int) -> None:
         assert check_torques([recorded(motion, tau + law, seed)], arm, 10.0) == []
 
 
-@pytest.mark.parametrize("seed", [1, 4])
-@pytest.mark.parametrize("size", [0.1, 0.2])
+@pytest.mark.parametrize(
+    ("seed", "size"),
+    [(1, 0.1), (4, 0.2), *(pytest.param(*each, marks=LONG) for each in ((1, 0.2), (4, 0.1)))],
+)
 def test_laws_of_one_joint_on_short_strokes_are_no_other_mounting(seed: int, size: float) -> None:
     """There gravity's sine is as good a line as a spring's, and one direction is as good as another."""
     arm, motion = three_axis(), fourier_motion(60.0, 100.0, seed, size=size)
@@ -86,8 +91,17 @@ def test_laws_of_one_joint_on_short_strokes_are_no_other_mounting(seed: int, siz
         assert check_torques([recorded(motion, tau + np.outer(law, first), seed)], arm, 10.0) == []
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize(("slower", "rubbing"), [(1.0, 3.0), (1.0, 0.1), (4.0, 1.0)])
+@pytest.mark.parametrize(
+    ("slower", "rubbing", "seed"),
+    [
+        (1.0, 0.1, 1),
+        (4.0, 1.0, 2),
+        *(
+            pytest.param(*each, marks=LONG)
+            for each in ((1.0, 3.0, 1), (1.0, 3.0, 2), (1.0, 0.1, 2), (4.0, 1.0, 1))
+        ),
+    ],
+)
 def test_the_slightest_lean_of_upright_axes_is_seen(seed: int, slower: float, rubbing: float) -> None:
     """A level base spares them gravity: the torques have no slope there, and any other direction explains nearly as much."""
     for lean in (0.03, 0.3) if seed == 1 else (0.1,):
@@ -103,7 +117,12 @@ def test_the_slightest_lean_of_upright_axes_is_seen(seed: int, slower: float, ru
 
 
 @pytest.mark.parametrize(
-    ("seed", "lean", "rubbing"), [(5, 0.1, 1.0), (2, 0.3, 1.0), (5, 0.2, 3.0), (1, 0.3, 0.1)]
+    ("seed", "lean", "rubbing"),
+    [
+        (5, 0.1, 1.0),
+        (1, 0.3, 0.1),
+        *(pytest.param(*each, marks=LONG) for each in ((2, 0.3, 1.0), (5, 0.2, 3.0))),
+    ],
 )
 def test_upright_axes_of_a_slow_record_neither_hang_nor_lean_beyond_doubt(
     seed: int, lean: float, rubbing: float
@@ -130,7 +149,7 @@ def test_measured_arms_stand_level_and_lean_where_their_urdf_does(measured: Path
             assert all(one.angle == pytest.approx(-0.03, abs=0.01) for one in stances if one is not found)
 
 
-@pytest.mark.parametrize("library", ["rigid-body", "lagrangian"])
+@pytest.mark.parametrize("library", ["rigid-body", pytest.param("lagrangian", marks=LONG)])
 def test_a_model_of_an_arm_that_leans_has_gravity_as_it_is(library: str, tmp_path: Path) -> None:
     leaning = turned_by(three_axis(), 6.0, (0, 1, 0))
     logs = [three_axes(seed, leaning, 0.3, 60.0) for seed in (1, 2)]

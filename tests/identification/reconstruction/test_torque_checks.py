@@ -1,6 +1,7 @@
 """Torques that cannot be the arm's are refused with the likely cause; honest ones never are."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -87,17 +88,20 @@ def test_an_arm_without_friction_is_not_accused() -> None:
 
 
 @pytest.mark.measured
-def test_measured_arms_are_not_accused_and_their_faults_are_found(measured: Path) -> None:
+@pytest.mark.parametrize(("every", "joints"), [(9, (1,)), pytest.param(3, range(6), marks=pytest.mark.long)])
+def test_measured_arms_are_not_accused_and_their_faults_are_found(
+    every: int, joints: Sequence[int], measured: Path
+) -> None:
     ur5 = [12.5, 12.5, 12.5, 9.2, 9.2, 9.2]
     arms = {"ur10e": None, "ur5": ur5, "panda": None, "double_pendulum": None}
     for folder, gains in arms.items():
         arm = load_arm(measured / folder / f"{folder}.urdf")
-        for path in sorted(measured.glob(f"{folder}/*.csv"))[::3]:
+        for path in sorted(measured.glob(f"{folder}/*.csv"))[::every]:
             if not path.name.endswith(".truth.csv"):
                 check_torques([read_log(path, drive_gains=gains, quiet=True)], arm, 8.0)
     arm = load_arm(measured / "ur10e" / "ur10e.urdf")
     log = read_log(measured / "ur10e" / "noload_20_01_31-unload.csv")
-    for j in range(6):
+    for j in joints:
         with pytest.raises(LogError, match=rf"the sign of tau{j + 1} is turned"):
             check_torques([replace(log, tau=log.tau * (1.0 - 2.0 * np.eye(6)[j]))], arm, 8.0)
         if j % 2:
