@@ -61,6 +61,18 @@ def test_parts_are_those_of_drake(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_a_joint_at_rest_feels_the_motion_of_the_others(kind):
+    arm, components = KINDS[kind]()
+    dynamics, plant = Dynamics(model_of(arm, *components)), drake(arm)
+    context = plant.CreateDefaultContext()
+    q = np.array([0.3, -0.8, 0.05, 0.4])[: arm.n]
+    plant.SetPositions(context, q)
+    for v in np.eye(arm.n):
+        plant.SetVelocities(context, v)
+        assert_allclose(dynamics.bias(q, v), plant.CalcBiasTerm(context), atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_parts_add_up_to_the_prediction_and_invert_it(kind):
     arm, components = KINDS[kind]()
     effects = EFFECTS if kind != "energies" else ()

@@ -81,9 +81,10 @@ class EnergyEquations(Equations):
         tau: list[Any] = [0.0] * self.n
         phases = self._phases(q)
         for wave, powers, sine, i, j, c in self._terms:
-            speeds = 1.0 if i < 0 else v[i] * v[j]
-            if is_nothing(speeds):
+            # one speed alone turns the momentum that a term has of it
+            if i >= 0 and is_nothing(v[i]) and is_nothing(v[j]):
                 continue
+            speeds = 1.0 if i < 0 else v[i] * v[j]
             s, cosine = phases[wave]
             polynomial = _powers(q, powers)
             slope = (cosine if sine else -s) * polynomial
