@@ -166,7 +166,7 @@ def test_a_joint_whose_inertia_the_terms_lack_gets_that_of_its_body():
     assert Dynamics(poor).mass_matrix(q)[2, 2] == 0
     M = Dynamics(with_mass_matrix(poor)).mass_matrix(q)
     assert np.linalg.eigvalsh(M).min() > 0
-    with pytest.raises(ModelError, match="not positive definite"):
+    with pytest.raises(ModelError, match=r"not positive definite.* impossible\. No links .* can exist"):
         with_mass_matrix(model_of(arm, *others, SparseTerms(3, inertia.index, -inertia.coefficients)))
 
 

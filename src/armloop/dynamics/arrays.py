@@ -21,6 +21,11 @@ from armloop.util.functions import MATH, NUMPY
 from armloop.util.given import shown
 
 _POSTURES = 2000
+#: What to do about a mass matrix that is not positive definite, of a model of rigid bodies and of any other.
+_NO_BODIES = "No links and rotors that can exist have its parameters: `armloop export --to urdf` writes the nearest that do"
+_NO_BODY = (
+    "Take armloop.dynamics.nearest_rigid_body of it, or reconstruct with the library rigid-body or lagrangian"
+)
 
 
 class Dynamics:
@@ -160,10 +165,10 @@ def require_mass_matrix(model: ReconstructedModel) -> tuple[float, Array]:
     value, at = float(smallest[worst]), q[worst]
     if not value > 0:
         posture = ", ".join(f"{x:.2f}" for x in at)
+        bodies = all(isinstance(component, RigidBody) for component in model.components)
         raise ModelError(
             f"the model's mass matrix is not positive definite: its smallest eigenvalue is {value:.3g} at q = ({posture}), "
-            "within the range it was fitted on; forward dynamics is impossible. Take armloop.dynamics.nearest_rigid_body "
-            "of it, or reconstruct with the library rigid-body or lagrangian"
+            f"within the range it was fitted on; forward dynamics is impossible. {_NO_BODIES if bodies else _NO_BODY}"
         )
     return value, at
 
