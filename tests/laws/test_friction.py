@@ -256,6 +256,13 @@ def test_what_an_element_is_unless_it_is_said():
     assert Acting(3.0, element).parameter == 0.0
 
 
+def test_what_fades_in_is_widened_to_a_width_and_no_other_parameter_is():
+    fading = Acting(2.0, KINDS["smooth_sign"], 0.05)
+    assert [fading.widened(width).parameter for width in (0.0, 0.02, 0.5)] == [0.05, 0.05, 0.5]
+    fall = Acting(1.0, KINDS["stribeck"], 0.01)
+    assert fall.widened(0.5) == fall
+
+
 def test_elements_add_up_with_what_fades_in_sharp_or_not():
     kinds = (("viscous", 2.0, 0.0), ("sign", 3.0, 0.0), ("load_sign", 4.0, 0.0), ("smooth_sign", 5.0, 0.5))
     terms = [Acting(c, KINDS[kind], p) for kind, c, p in kinds]

@@ -55,7 +55,8 @@ class ModelEquations:
         Args:
             step: what of it: 1 gravity and dry friction, 2 with velocity terms, 3 the whole with its effects.
             smoothing: speed, rad/s or m/s, within which dry friction changes sign as tanh(v / smoothing), of all
-                joints or of each; 0 for the sign itself, which has no derivative at rest.
+                joints or of each, or more slowly where the model's own fades in over a wider range; 0 for the sign
+                itself, which has no derivative at rest.
             sharp: take smoothed dry friction of the model, tanh(v / p), as sign(v), for a plant that sticks.
             symmetric: take (M + M^T) / 2 for M. The mass matrix of sparse terms is not symmetric by itself.
 
@@ -93,6 +94,8 @@ class ModelEquations:
             along: each[along.joint] + (abs(along.ratio) * each[along.other] if along.ratio else 0.0)
             for along in self._friction
         }
+        for along, terms in self._friction.items():
+            terms[:] = [t.widened(self._smoothing[along]) for t in terms]
         rubbing = [t.element for terms in self._friction.values() for t in terms]
         self.load_matters = any(element.by_load for element in rubbing)
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.motion import Motion
-from armloop.drake.plant.beyond_bodies import explicit_part, presliding_elements, widened
+from armloop.drake.plant.beyond_bodies import explicit_part, presliding_elements
 from armloop.dynamics import ModelEquations
 from armloop.export.exported import NAMES, Exported, rms_of, whole_torque
 from armloop.export.expressible import Said, random_motion, said
@@ -128,7 +128,7 @@ def _smoothed(model: ReconstructedModel, what: Said, motion: Motion, smoothing: 
 
     The load that friction grows with is taken without acceleration.
     """
-    whole = ModelEquations(widened(model, smoothing), MATH, smoothing=smoothing)
+    whole = ModelEquations(model, MATH, smoothing=smoothing)
     bodies = tuple(a for a in model.effects if a.effect.name in ("payload", "rotor_inertia"))
     rigid = ModelEquations(replace(model, effects=bodies), MATH)
     rows = what.torque(motion.q, motion.v, motion.vdot, frozenset())
@@ -169,7 +169,7 @@ def _smoothing(model: ReconstructedModel, what: Said) -> list[float]:
 
 def _steepness(model: ReconstructedModel, widths: Sequence[float], loads: list[float], j: int) -> float:
     """How steeply the friction of joint j that is applied explicitly rises at rest, N m s (N s/m)."""
-    equations = ModelEquations(explicit_part(model, widths), MATH, smoothing=widths)
+    equations = ModelEquations(explicit_part(model), MATH, smoothing=widths)
     still = [0.0] * model.arm.n
     speed = 1e-4 * widths[j]
     there, back = (

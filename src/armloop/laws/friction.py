@@ -106,6 +106,11 @@ class Acting(NamedTuple):
     element: Element
     parameter: float = 0.0
 
+    def widened(self, width: float) -> Acting:
+        """The same; where its direction fades in, it does over no less than a width, rad/s (m/s)."""
+        fades = self.element.way == "fading"
+        return self._replace(parameter=max(self.parameter, width)) if fades else self
+
 
 def torque_along(
     terms: Iterable[Acting], x: Sliding, load: Any, functions: Functions, sharp: bool = True

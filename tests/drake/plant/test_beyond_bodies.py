@@ -6,7 +6,7 @@ from exact_parts import model_of
 from numpy.testing import assert_allclose
 
 from armloop.drake import BeyondBodies, friction_systems
-from armloop.drake.plant.beyond_bodies import explicit_part, per_joint, presliding_elements, widened
+from armloop.drake.plant.beyond_bodies import explicit_part, per_joint, presliding_elements
 from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionTerm
 from armloop.model import AddedEffect
@@ -57,11 +57,6 @@ def test_what_fades_in_more_slowly_keeps_its_own_width(arm) -> None:
     assert_allclose(
         force(model, smoothing=[0.02, 0.05, 0.5]), -2 * np.tanh(V / [0.05, 0.05, 0.5]), rtol=1e-12
     )
-    wide = widened(model, [0.02, 0.05, 0.5])
-    assert [law[0].parameter for law in wide.friction.terms] == [0.05, 0.05, 0.5]
-    # a width of a Stribeck curve is no fading in
-    fall = widened(model_of(arm, friction=(FrictionTerm("stribeck", 1.0, 0.01),)), [0.5] * 3)
-    assert [law[0].parameter for law in fall.friction.terms] == [0.01] * 3
 
 
 def test_springs_are_there_and_bodies_and_sensors_are_not(arm) -> None:
@@ -102,7 +97,7 @@ def test_what_remembers_has_a_system_of_its_own(arm) -> None:
     assert len(friction_systems(model_of(arm, friction=terms[:1]), 0.02, 1e-3)) == 1
     # it is not in the explicit part
     assert_allclose(force(found), -np.tanh(V / 0.02), rtol=1e-12)
-    rest = explicit_part(found, [0.02] * 3)
+    rest = explicit_part(found)
     assert [[t.kind for t in law] for law in rest.friction.terms] == [["sign"]] * 3
     assert [a.parameters["level"].value for a in rest.effects] == [0.0]
 

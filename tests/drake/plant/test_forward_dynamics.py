@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from exact_parts import energies, model_of, rigid_body, scara_terms
+from exact_parts import STRIBECK, energies, model_of, rigid_body, scara_terms
 from numpy.testing import assert_allclose
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.planning import DirectCollocation
@@ -99,9 +99,16 @@ def test_without_friction_it_moves_like_drakes_own(kind):
     assert_allclose(ours, theirs, atol=1e-4)
 
 
-def test_linearised_at_rest():
+SHARP_AND_FADING = {
+    "sharp": STRIBECK,
+    "fading in over less": (FrictionTerm("smooth_sign", 0.72, 0.003), FrictionTerm("viscous", 2.65)),
+}
+
+
+@pytest.mark.parametrize("friction", SHARP_AND_FADING)
+def test_linearised_at_rest(friction):
     """dv' = M^-1 (du - G dq - F dv), with G the stiffness of gravity and F the slope of the smoothed friction."""
-    model, smoothing = model_of(ARM), 0.05
+    model, smoothing = model_of(ARM, friction=SHARP_AND_FADING[friction]), 0.05
     system, dynamics = ForwardDynamics(model, smoothing=smoothing), Dynamics(model)
     context = system.CreateDefaultContext()
     context.SetContinuousState(np.r_[Q0, np.zeros(3)])

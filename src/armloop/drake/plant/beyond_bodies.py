@@ -14,7 +14,7 @@ from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations, viscous_coefficients
 from armloop.laws.effects.base import number
-from armloop.laws.friction import KINDS, FrictionLaw
+from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
 from armloop.util.errors import InputError
 from armloop.util.given import levels_of, require
@@ -57,7 +57,7 @@ def BeyondBodies_(T: type) -> Any:
             self.arm = model.arm
             self.damping = viscous_coefficients(model)
             functions = functions_of(T)
-            sliding = explicit_part(model, widths)
+            sliding = explicit_part(model)
             self._whole = ModelEquations(sliding, functions, smoothing=widths)
             bodies = tuple(a for a in model.effects if a.effect.name in _BODIES)
             others = [a for a in sliding.effects if not a.effect.sensor and a.effect.name not in _BODIES]
@@ -114,23 +114,10 @@ def per_joint(smoothing: float | Sequence[float], n: int) -> list[float]:
     return widths
 
 
-def widened(model: ReconstructedModel, widths: Sequence[float]) -> ReconstructedModel:
-    """The model with dry friction that fades in over less than its joint's width fading in over that."""
+def explicit_part(model: ReconstructedModel) -> ReconstructedModel:
+    """The model without viscous terms, which the plant has as damping, and without what remembers."""
     terms = tuple(
-        tuple(
-            replace(t, parameter=max(t.parameter, width)) if KINDS[t.kind].way == "fading" else t
-            for t in joint
-        )
-        for joint, width in zip(model.friction.terms, widths, strict=True)
-    )
-    return replace(model, friction=FrictionLaw(terms))
-
-
-def explicit_part(model: ReconstructedModel, widths: Sequence[float]) -> ReconstructedModel:
-    """The widened model without viscous terms, which the plant has as damping, and without what remembers."""
-    terms = tuple(
-        tuple(t for t in joint if t.kind not in ("viscous", "hysteresis"))
-        for joint in widened(model, widths).friction.terms
+        tuple(t for t in joint if t.kind not in ("viscous", "hysteresis")) for joint in model.friction.terms
     )
     effects = []
     for added in model.effects:

@@ -39,8 +39,8 @@ def EffectTorque_(T: type) -> Any:
         (n,), to add to a plant's applied generalized forces (`add_joint_forces`). N*m (N). Stateless; time enters where
         the law knows it. Scalar types float, AutoDiffXd and Expression.
 
-        The sign of dry friction is smoothed as tanh(v / `smoothing`). Friction that grows with the load takes the load
-        from the input port `load` (n,), declared for it alone.
+        The sign of dry friction, and what fades in over less, is smoothed as tanh(v / `smoothing`). Friction that
+        grows with the load takes the load from the input port `load` (n,), declared for it alone.
 
         An inertia cannot be added to a plant by a force, for its acceleration would depend on itself: on a plant,
         connect `vdot` to the reference's, to a delayed measurement, or build the plant with the effect
@@ -83,6 +83,7 @@ def EffectTorque_(T: type) -> Any:
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             self._vdot = self.DeclareVectorInputPort("vdot", n) if self._law.has_inertia else None
             rubbing = self._law.friction.terms if self._law.friction else ()
+            self._rubbing = [t.widened(smoothing) for t in rubbing]
             by_load = any(t.element.by_load for t in rubbing)
             self._load = self.DeclareVectorInputPort("load", n) if by_load else None
             sources = {self.all_input_ports_ticket(), self.time_ticket()}
@@ -100,12 +101,12 @@ def EffectTorque_(T: type) -> Any:
                     q, v, still if self._vdot is None else self._vdot.Eval(context).tolist()
                 )
             if law.friction is not None:
-                along, terms = law.friction
+                along = law.friction.along
                 w, functions = along.of(v), functions_of(T)
                 sign = functions.tanh(w / self._smoothing)
                 load = 0.0 if self._load is None else self._load.Eval(context).tolist()[along.joint]
                 x = Sliding(along.of(q), w, sign, context.get_time())
-                along.add(tau, torque_along(terms, x, load, functions, sharp=False))
+                along.add(tau, torque_along(self._rubbing, x, load, functions, sharp=False))
             if self._interval is not None:
                 factor = factor * within(T, context.get_time(), *self._interval)
             output.SetFromVector(vector(T, [factor * x for x in tau]))
