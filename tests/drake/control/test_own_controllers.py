@@ -118,3 +118,29 @@ def test_ports_of_a_law_are_those_of_the_loop_and_of_its_joints(short, law, told
 def test_a_law_has_those_ports_that_it_wants(short, ports):
     law = Ports({"state": 6, **dict.fromkeys(ports, 3)})
     assert add_arm_under(DiagramBuilder(), short.plant, law, short.reference).controller is law
+
+
+class Holds(Ports):
+    """A law that evaluates its model itself."""
+
+    model = None
+
+    def set_model(self, model):
+        self.model = model
+
+
+def test_the_model_of_a_law_is_exchanged_where_the_law_has_it(short):
+    model = exact_model(short.plant.arm, short.plant.config.friction)
+    fed, holds = Ports({"state": 6, "tau_ff": 3}), Holds({"state": 6})
+    for law in (fed, holds):
+        arm = add_arm_under(DiagramBuilder(), short.plant, law, short.reference)
+        with pytest.raises(InputError, match="step is 5"):
+            arm.set_model(model, 5)
+        arm.set_model(model)
+        tau = arm.reference.GetOutputPort("tau_ff").Eval(arm.reference.CreateDefaultContext())
+        wanted = model.feedforward(*(table[0] for table in arm.reference.tables))
+        np.testing.assert_allclose(tau, wanted if law is fed else np.zeros(3), atol=1e-9)
+    assert holds.model is model
+    arm = add_arm_under(DiagramBuilder(), short.plant, Ports({"state": 6}), short.reference, name="mine")
+    with pytest.raises(InputError, match="mine: takes no model"):
+        arm.set_model(model)

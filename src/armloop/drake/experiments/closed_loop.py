@@ -64,15 +64,23 @@ class ControlledArm:
     def set_model(self, model: Any, step: int = 3) -> None:
         """Exchange the model in a running simulation, between two calls of `Simulator.AdvanceTo`.
 
-        step : how much of it PID is fed; computed torque takes the whole
+        step : how much of it is fed forward (`tau_ff`); a law that holds the model, as computed torque, takes the whole
+
+        Raises `InputError` where the control law takes none.
         """
+        require_step(step)
+        fed, held = self.controller.HasInputPort("tau_ff"), getattr(self.controller, "set_model", None)
+        if not fed and held is None:
+            raise InputError(
+                f"{self.controller.get_name()}: takes no model; a control law that does has the port tau_ff or a set_model"
+            )
         if isinstance(model, ReconstructedModel):
             model.arm.require_same(self.plant.arm, "the model")
             say_other_stance(self.plant.arm, self.plant.effects.gravity(self.plant.arm), model.arm)
-        if isinstance(self.controller, PidController):
+        if fed:
             self.reference.set_model(model, step)
-        else:
-            self.controller.set_model(model)
+        if held is not None:
+            held(model)
 
 
 def add_arm_with_controller(
