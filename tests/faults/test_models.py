@@ -213,6 +213,7 @@ ADOPTED: dict[str, tuple[dict[str, Any], str]] = {
     "no power": ({**RANGE, "cos(q1)^0": 1.0}, "a power is at least 1"),
     "joint 0": ({**RANGE, "q0*v1": 1.0}, "joints are counted from 1"),
     "another arm's joint": ({**RANGE, "cos(q1-q9)": 1.0}, "a joint that its range does not know"),
+    "that joint without a range": ({"cos(q1-q9)": 1.0}, "a term of joint 9; the arm has 3"),
     "a range turned round": ({**RANGE, "v_low": [2.0] * 3, "v1": 1.0}, "a v_low above its v_high"),
     "half a range": ({"q_low": [0.0] * 3, "v1": 1.0}, "needs q_low, q_high, v_low, v_high"),
     "a range of two joints": ({**RANGE, "q_high": [1.0] * 2, "v1": 1.0}, "needs q_low, q_high"),

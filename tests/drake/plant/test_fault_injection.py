@@ -275,6 +275,11 @@ def test_refuses_what_is_no_effect(name, joint, parameters, message):
 def test_refuses_a_joint_the_arm_does_not_have(arm):
     with pytest.raises(ScenarioError, match="has joints 1 to 3"):
         realise(arm, [UndeclaredEffect("torque_offset", 4, {"offset": 1.0})])
+    of_another = {"cos(2*q1-q9)*v2": 3.0}
+    with pytest.raises(ScenarioError, match="unlisted: joint 9; three_axis has joints 1 to 3"):
+        realise(arm, [UndeclaredEffect("unlisted", 2, of_another)])
+    with pytest.raises(ModelError, match="unlisted: joint 9; three_axis has joints 1 to 3"):
+        EffectTorque(arm, "unlisted", 2, of_another)
 
 
 def test_every_effect_of_the_table_is_here_but_a_torque_from_outside_on_one_joint():

@@ -73,7 +73,7 @@ def EffectTorque_(T: type) -> Any:
             kind = effect(name, joint, other_joint)
             if not kind.simulated:
                 raise ModelError(f"effect {name} is found in logs alone; no system can have it")
-            fault = misplaced(arm, kind) or misstated(type(kind), parameters, whole=False)
+            fault = misplaced(arm, kind, parameters) or misstated(type(kind), parameters, whole=False)
             if fault:
                 raise ModelError(f"effect {name}: {fault}")
             self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)

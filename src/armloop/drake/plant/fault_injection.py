@@ -128,7 +128,7 @@ def realise(arm: Arm, effects: Effects) -> Realisation:
     made = Realisation(np.zeros(arm.n), np.zeros(arm.n))
     for given in sorted(effects, key=lambda each: effect_kind(each.name).fault_order):
         kind, p = given.build(), given.parameters
-        if fault := misplaced(arm, kind):
+        if fault := misplaced(arm, kind, p):
             raise ScenarioError(f"effect {given.name}: {fault}")
         law = None if kind.sensor else kind.placed(p)
         if kind.sensor:

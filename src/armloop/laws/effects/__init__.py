@@ -81,10 +81,10 @@ def effect(name: Any, joint: Any, other_joint: Any = None) -> Effect:
     return kind(joint, other_joint)
 
 
-def misplaced(arm: Arm, effect: Effect) -> str:
+def misplaced(arm: Arm, effect: Effect, parameters: Mapping[str, Any]) -> str:
     """What is wrong with the place of an effect on an arm; empty if nothing is."""
-    for joint in (effect.joint, effect.other_joint):
-        if joint is not None and not 1 <= joint <= arm.n:
+    for joint in effect.joints(parameters):
+        if not 1 <= joint <= arm.n:
             return f"joint {joint}; {arm.name} has joints 1 to {arm.n}"
     return ""
 

@@ -224,6 +224,10 @@ class Effect(ABC):
         """The joints that it sits in, counted from 0; none if it concerns the whole arm."""
         return tuple(joint - 1 for joint in (self.joint, self.other_joint) if joint is not None)
 
+    def joints(self, parameters: Mapping[str, Any]) -> list[int]:
+        """The joints, counted from 1, that its law with these parameters is of; none if it is of the whole arm."""
+        return [index + 1 for index in self.indices]
+
     @property
     def place(self) -> Place:
         """Name and joints."""

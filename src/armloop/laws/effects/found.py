@@ -6,7 +6,7 @@ It knows where it was seen: inside the range of its run it acts in full, outside
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
@@ -35,6 +35,11 @@ class _Factor:
     power: int
     joint: int = 0
     wave: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def joints(self) -> list[int]:
+        """Whose state it is a function of, counted from 0."""
+        return [j for j, _ in self.wave] or [self.joint]
 
     def __call__(self, functions: Functions, q: Sequence[Any], v: Sequence[Any]) -> Any:
         if self.wave:
@@ -66,6 +71,10 @@ class FoundLaw(Effect):
         raise NotImplementedError(
             "an unlisted law is no hypothesis; its functions are found by a search of their own"
         )
+
+    def joints(self, parameters: Mapping[str, Any]) -> list[int]:
+        of_terms = [] if self.fault(parameters) else _joints(parameters)
+        return [*super().joints(parameters), *(j + 1 for j in of_terms)]
 
     def of_state(self, parameters: Mapping[str, Value]) -> StateLaw:
         terms = [(_factors(name), number(value)) for name, value in parameters.items() if name not in RANGE]
@@ -100,6 +109,8 @@ class FoundLaw(Effect):
         low = parameters[RANGE[0]].value if RANGE[0] in parameters else [0.0] * arm.n
         if not fault and len(np.atleast_1d(low)) != arm.n:
             fault = f"{RANGE[0]} has another number of joints than the arm, {arm.n}"
+        if not fault and max(_joints(parameters), default=0) >= arm.n:
+            fault = f"has a term of joint {max(_joints(parameters)) + 1}; the arm has {arm.n}"
         if fault:
             raise ModelError(f"effect {self.label()}: {fault}")
         return True
@@ -121,8 +132,7 @@ class FoundLaw(Effect):
             low, high = (parameters[f"{end}_{side}"] for side in ("low", "high"))
             if any(first > last for first, last in zip(low, high, strict=True)):
                 return f"has a {end}_low above its {end}_high"
-        joints = [j for factors in terms for f in factors for j in (f.joint, *(j for j, _ in f.wave))]
-        if max(joints, default=0) >= len(ranges[0] or []):
+        if max(_joints(parameters), default=0) >= len(ranges[0] or []):
             return "has a term of a joint that its range does not know"
         return ""
 
@@ -175,6 +185,11 @@ def _unit(arm: Arm, joint: int, name: str) -> str:
     return unit
 
 
+def _joints(parameters: Iterable[str]) -> list[int]:
+    """The joints that terms are functions of, counted from 0."""
+    return [j for name in parameters if name not in RANGE for factor in _factors(name) for j in factor.joints]
+
+
 def _fading(x: Any, middle: float, half: float) -> Any:
     """1 within the range, 0 beyond :data:`FAR` of it, a smooth step between."""
     inside = (FAR * half - abs(x - middle)) / ((FAR - 1.0) * half)
@@ -188,7 +203,7 @@ def _range(
     """Middle and half width of the range of each position and speed that the terms contain."""
     used: dict[tuple[str, int], None] = {}
     for factor in (factor for factors, _ in terms for factor in factors):
-        for joint in [j for j, _ in factor.wave] or [factor.joint]:
+        for joint in factor.joints:
             used["q" if factor.wave or factor.kind == "q" else "v", joint] = None
     found = []
     for kind, joint in used:
