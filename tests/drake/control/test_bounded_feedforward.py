@@ -92,8 +92,39 @@ def test_torques_keep_their_rates_too(scara):
 def test_limits_that_do_not_bind_change_nothing(scara, hurry, effort):
     model = exact_model(scara.arm, scara.config.friction)
     t = np.linspace(0, hurry.duration, 200)
-    free = bounded_reference(hurry, model, 100 * effort)
-    assert_allclose(free.evaluate(t)[0], hurry.evaluate(t)[0], atol=1e-6)
+    for limit in (100 * effort, np.inf):
+        free = bounded_reference(hurry, model, limit)
+        assert_allclose(free.evaluate(t)[0], hurry.evaluate(t)[0], atol=1e-6)
+
+
+def test_rates_are_kept_by_drives_without_a_limit_of_torque(scara):
+    hurry, rate = load_tracking("torque_limits:weak_and_slow").reference, np.array([60.0, 60.0, np.inf, 60.0])
+    bounded = bounded_reference(hurry, exact_model(scara.arm, scara.config.friction), np.inf, rate)
+    tau, free = bounded.torques, torques(scara, hurry)
+    change, asked = (np.abs(np.diff(each, axis=0)).max(axis=0) / 0.01 for each in (tau, free))
+    assert asked[0] > 1.2 * rate[0] and np.all(change <= 1.02 * rate)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"effort": -1.0}, "effort must be above 0"),
+        ({"effort": [1.0, np.nan, 1.0, 1.0]}, "effort must be above 0"),
+        ({"effort": [1.0, 1.0]}, "one for each of 4 joints"),
+        ({"rate": [0.0] * 4}, "rate must be above 0"),
+        ({"rate": "60"}, "rate must be above 0"),
+        ({"knot": 0.0}, "knot must be a number above 0"),
+        ({"model": ExactModel}, "must be a ReconstructedModel"),
+        (
+            {"reference": fourier_reference(MotionRanges.of(load_arm("three_axis")), 1.0, 2)},
+            "the reference is for 3",
+        ),
+    ],
+)
+def test_limits_that_are_none_are_refused(scara, hurry, given, told):
+    model = exact_model(scara.arm, scara.config.friction)
+    with pytest.raises(InputError, match=told):
+        bounded_reference(**{"reference": hurry, "model": model, "effort": 9.0} | given)
 
 
 def test_what_gravity_alone_exceeds_is_refused():

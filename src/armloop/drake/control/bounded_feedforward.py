@@ -18,12 +18,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armloop.drake.control.bounded_program import Program
+from armloop.drake.control.reference import ReferenceLike, as_reference
+from armloop.drake.given import require_joints, require_model
 from armloop.dynamics import ModelEquations
 from armloop.experiment.excitation import Reference, TableReference
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.functions import NUMPY
+from armloop.util.given import require, shown
 
 _ROUNDS = 40
 # w of the program once a round moves the velocities farther than the one before, by how much it grows, and until when
@@ -38,6 +41,7 @@ _NONE, _REMEDY = (
 _SLOW = 0.05  # rad/s (m/s), slower than which a deviation may turn a joint round
 _APART = 1e-5  # rad/s (m/s), rad (m), between the ends of a difference
 _CREEP = 1e-9  # rad/s (m/s), where friction is that of breaking loose
+_AMPLE = 10.0  # times what the reference asks for and 1 N*m (N), which stands for a torque without a limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,31 +72,38 @@ class BoundedReference:
 
 
 def bounded_reference(
-    reference: Reference,
+    reference: ReferenceLike,
     model: ReconstructedModel,
-    effort: Array,
-    rate: Array | None = None,
+    effort: ArrayLike,
+    rate: ArrayLike | None = None,
     *,
     knot: float = 0.01,
 ) -> BoundedReference:
     """Return the motion nearest to the reference within limits of torque and of its rate, starting on it.
 
-    model : whose torques are bounded; effort : (n,) N*m (N); rate : (n,) N*m/s (N/s), none by default; knot : s
+    model : whose torques are bounded; effort : (n,) N*m (N), inf for none; rate : (n,) N*m/s (N/s), none by default;
+        knot : s
 
-    Raises `InputError` when no motion near the reference keeps the limits, such as where gravity alone exceeds them.
+    Raises `InputError` when no motion near the reference keeps the limits, such as where gravity alone exceeds them, and
+    for limits that are none.
     """
+    require_model(model)
+    require("a number above 0", knot=knot)
+    reference = as_reference(reference)
     n, steps = model.arm.n, max(2, round(reference.duration / knot))
-    effort = np.asarray(effort, dtype=float)
-    rate = np.full(n, np.inf) if rate is None else np.asarray(rate, dtype=float)
+    effort, rate = _limits(effort, n, "effort"), _limits(np.inf if rate is None else rate, n, "rate")
     limits = f"{np.round(effort, 3).tolist()}"
     if np.isfinite(rate).any():
         limits += f" and rates {np.round(rate, 3).tolist()}"
     time = np.linspace(0.0, reference.duration, steps + 1)
     h = float(time[1])
     base = reference.evaluate(time)
+    require_joints(model, base[0].shape[1], "the reference is for")
     equations = ModelEquations(model, NUMPY, sharp=True)
     dry, _, slow = _dry_friction(equations, *base)
     level = _dry_friction(equations, base[0], _CREEP + 0 * base[1], base[2])[1]
+    asked = _torque(equations, *base) + _smooth_friction(equations, *base[:2])[0]
+    effort = np.where(np.isinf(effort), _AMPLE * (1.0 + (np.abs(asked) + level).max(axis=0)), effort)
     d, torques, excess = np.zeros((3, steps + 1, n)), np.zeros((steps + 1, n)), np.inf
     near, moved = 0.0, np.full(2, np.inf)
     for _ in range(_ROUNDS):
@@ -128,6 +139,16 @@ def bounded_reference(
             f"{_NONE} {limits}, or none was found: the nearest that was needs {1 + excess:.2g} times as much; {_REMEDY}"
         )
     return BoundedReference(reference, TableReference(time, *d), torques)
+
+
+def _limits(given: ArrayLike, n: int, what: str) -> Array:
+    """Return (n,) limits, of one for all joints or one for each; raises `InputError` unless they are above 0."""
+    found = np.asarray(given)
+    if found.dtype.kind not in "fiu" or found.shape not in ((), (n,)) or not (found > 0).all():
+        raise InputError(
+            f"{what} must be above 0, one number or one for each of {n} joints; it is {shown(given)}"
+        )
+    return np.broadcast_to(found, n).astype(float)
 
 
 def _linear(J: list[Array], d: Array) -> Array:
