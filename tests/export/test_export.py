@@ -226,6 +226,18 @@ def test_the_drake_program_has_all_of_the_model(tmp_path):
     assert "q after 0.1 s" in done.stdout
 
 
+def test_a_root_of_the_speed_does_not_take_dry_friction_away(tmp_path):
+    """Infinitely steep at rest, whatever dry friction does: it is rounded off, not dry friction with it."""
+    widths = []
+    for root in (0.0, 0.5):
+        terms = FrictionTerm("sign", 0.5), FrictionTerm("viscous", 2.0), FrictionTerm("root", root)
+        found = export(model_of(ARMS["three_axis"], friction=terms), "drake", tmp_path / f"{root}")
+        assert (found.difference < 1e-6 * found.rms).all()
+        program = (tmp_path / f"{root}" / "simulate.py").read_text()
+        widths.append(json.loads(re.search(r"smoothing=(\[[^]]*\])", program)[1]))
+    assert np.all(np.divide(*widths[::-1]) < 1.5)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("steep", [False, True])
 def test_the_drake_program_does_not_chatter_and_a_steeper_one_would(tmp_path, steep):

@@ -211,12 +211,13 @@ def test_terms_that_are_none_are_refused(data):
 #: Every kind at v = -0.7 and 0.7 rad/s with the parameter 0.5, 2 s after the start; the step that finds it, how its
 #: direction turns, and whether it grows with the load.
 FALL = np.exp(-1.96)
+ROUNDED = 0.7 / (0.7**2 + 0.5**2) ** 0.25
 AT = {
     "smooth_sign": (-1.0, 1.0, 1, "fading", False),
     "viscous": (-0.7, 0.7, 2, "sharp", False),
     "offset": (1.0, 1.0, 1, "sharp", False),
     "stribeck_peak": (-FALL, FALL, 2, "sharp", False),
-    "root": (-np.sqrt(0.7), np.sqrt(0.7), 2, "sharp", False),
+    "root": (-ROUNDED, ROUNDED, 2, "sharp", False),
     "quadratic": (-0.49, 0.49, 2, "sharp", False),
     "cubic": (-0.343, 0.343, 2, "sharp", False),
     "viscous_forward": (0.0, 0.7, 2, "sharp", False),
@@ -256,7 +257,11 @@ def test_what_an_element_is_unless_it_is_said():
     assert Acting(3.0, element).parameter == 0.0
 
 
-def test_what_fades_in_is_widened_to_a_width_and_no_other_parameter_is():
+def test_what_is_steep_at_rest_is_widened_to_a_width_and_no_other_parameter_is():
+    root = Acting(3.0, KINDS["root"]).widened(0.04)
+    x = np.array([1e-6, 5.0])
+    rounded = torque_along([root], Sliding(0.0, x, 1.0), 0.0, NUMPY)
+    assert rounded == pytest.approx([3.0 * 1e-6 / np.sqrt(0.04), 3.0 * np.sqrt(5.0)], rel=1e-4)
     fading = Acting(2.0, KINDS["smooth_sign"], 0.05)
     assert [fading.widened(width).parameter for width in (0.0, 0.02, 0.5)] == [0.05, 0.05, 0.5]
     fall = Acting(1.0, KINDS["stribeck"], 0.01)

@@ -75,6 +75,7 @@ class Element:
             state of an elasto-plastic element (:mod:`armloop.laws.hysteresis`) of the width ``parameter``.
         by_load: whether it grows with the torque that passes the joint, abs(load).
         called: what a user calls the friction law that it belongs to, if the selection has it.
+        steep: whether it is infinitely steep at rest but for ``parameter``, rad/s (m/s), below which it is rounded off.
     """
 
     value: Callable[[Sliding, float, Functions], Any]
@@ -84,6 +85,7 @@ class Element:
     by_load: bool = False
     part: str = "friction"
     called: tuple[str, ...] = ()
+    steep: bool = False
 
     @property
     def of_time(self) -> bool:
@@ -107,8 +109,8 @@ class Acting(NamedTuple):
     parameter: float = 0.0
 
     def widened(self, width: float) -> Acting:
-        """The same; where its direction fades in, it does over no less than a width, rad/s (m/s)."""
-        fades = self.element.way == "fading"
+        """The same; where its direction fades in, or it is steep, it does over no less than a width, rad/s (m/s)."""
+        fades = self.element.way == "fading" or self.element.steep
         return self._replace(parameter=max(self.parameter, width)) if fades else self
 
 
@@ -149,10 +151,11 @@ KINDS: dict[str, Element] = {
     ),
     # sqrt(|v|) sign(v), rounded off below 1e-10 so that it has a derivative at rest
     "root": Element(
-        lambda x, p, f: x.v / f.sqrt(f.sqrt(x.v * x.v + 1e-20)),
+        lambda x, p, f: x.v / f.sqrt(f.sqrt(x.v * x.v + (p * p + 1e-20))),
         "sqrt(abs(v{j}))*sign(v{j})",
         2,
         called=("nonlinear_viscous",),
+        steep=True,
     ),
     "quadratic": Element(lambda x, p, f: abs(x.v) * x.v, "abs(v{j})*v{j}", 2, called=("nonlinear_viscous",)),
     "cubic": Element(lambda x, p, f: x.v * x.v * x.v, "v{j}^3", 2, called=("nonlinear_viscous",)),

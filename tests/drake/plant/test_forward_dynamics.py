@@ -99,16 +99,20 @@ def test_without_friction_it_moves_like_drakes_own(kind):
     assert_allclose(ours, theirs, atol=1e-4)
 
 
-SHARP_AND_FADING = {
-    "sharp": STRIBECK,
-    "fading in over less": (FrictionTerm("smooth_sign", 0.72, 0.003), FrictionTerm("viscous", 2.65)),
+FADING = FrictionTerm("smooth_sign", 0.72, 0.003), FrictionTerm("viscous", 2.65)
+#: Laws whose slope at rest is 0.72 / smoothing + 2.65, and what it has in addition.
+STEEP = {
+    "sharp": (STRIBECK, 0.0),
+    "fading in over less": (FADING, 0.0),
+    "with a root of the speed": ((*FADING, FrictionTerm("root", 0.4)), 0.4 / np.sqrt(0.05)),
 }
 
 
-@pytest.mark.parametrize("friction", SHARP_AND_FADING)
-def test_linearised_at_rest(friction):
+@pytest.mark.parametrize("law", STEEP)
+def test_linearised_at_rest(law):
     """dv' = M^-1 (du - G dq - F dv), with G the stiffness of gravity and F the slope of the smoothed friction."""
-    model, smoothing = model_of(ARM, friction=SHARP_AND_FADING[friction]), 0.05
+    friction, more = STEEP[law]
+    model, smoothing = model_of(ARM, friction=friction), 0.05
     system, dynamics = ForwardDynamics(model, smoothing=smoothing), Dynamics(model)
     context = system.CreateDefaultContext()
     context.SetContinuousState(np.r_[Q0, np.zeros(3)])
@@ -119,7 +123,7 @@ def test_linearised_at_rest(friction):
         [(dynamics.gravity(Q0 + h * e) - dynamics.gravity(Q0 - h * e)) / (2 * h) for e in np.eye(3)], 1
     )
     inverse = np.linalg.inv(dynamics.mass_matrix(Q0))
-    slope = 0.72 / smoothing + 2.65
+    slope = 0.72 / smoothing + 2.65 + more
     assert_allclose(linear.A()[:3], np.hstack([np.zeros((3, 3)), np.eye(3)]), atol=1e-9)
     assert_allclose(linear.A()[3:], -inverse @ np.hstack([G, slope * np.eye(3)]), rtol=1e-6, atol=1e-4)
     assert_allclose(linear.B()[3:], inverse, rtol=1e-9)

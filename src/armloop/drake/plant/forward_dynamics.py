@@ -28,10 +28,10 @@ def ForwardDynamics_(T: type) -> Any:
 
         M, bias and gravity are those of the model and of the effects that a diagnosis added to it (payload,
         rotor inertia, spring, ripple, tilt); f is the model's friction with that of added effects, its sign
-        smoothed: sign(v), and what fades in over less, becomes tanh(v / `smoothing`). Such a joint creeps instead of
-        sticking, at the speed at which tanh carries the load; `StickingForwardDynamics` sticks. A small `smoothing`
-        makes the equations stiff: error-controlled integrators slow down, and fixed steps h need
-        h f_c (M^-1)_ii < 2 `smoothing`.
+        smoothed: sign(v), and what fades in over less, becomes tanh(v / `smoothing`), and a root of the speed is rounded
+        off below it. Such a joint creeps instead of sticking, at the speed at which tanh carries the load;
+        `StickingForwardDynamics` sticks. A small `smoothing` makes the equations stiff: error-controlled integrators
+        slow down, and fixed steps h need h f_c (M^-1)_ii < 2 `smoothing`.
 
         Input port: `tau` (n,), the drives' torques, N*m (N). Output port: `state` (2n,), q, then v.
         2n continuous states, n of them positions, n velocities. No direct feedthrough.
