@@ -8,7 +8,9 @@ import pytest
 from answers import answered
 
 from armloop.drake.experiments.scenarios import load_tracking
+from armloop.drake.plant.exact import exact_model
 from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.model.components import RigidBody
 from armloop.reports.plots.loops import bode_figure
 from armloop.reports.tuning_tables import gains_table, margins_table, missed_notes, verified_table
 from armloop.util.errors import InputWarning
@@ -70,3 +72,20 @@ def test_what_the_arm_has_beside_is_said_not_to_be_tuned_for(monkeypatch):
         patch.setattr("armloop.workflows.tuning.propose_gains", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             tune_scenario(dataclasses.replace(built_in, effects=(drag,)), 30.0, 60.0, None, None, silent)
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.4, False), (1.6, True), (1 / 1.6, True)])
+def test_a_model_of_another_inertia_than_the_simulated_arms_is_said(factor, said, monkeypatch):
+    """As of an arm whose URDF knows no rotors: gains for the model's may be unstable on it."""
+    scenario = load_tracking("three_axis_tracking")
+    model = exact_model(scenario.plant.arm, scenario.plant.config.friction)
+    (bodies,) = model.components
+    assert isinstance(bodies, RigidBody)
+    heavy = dataclasses.replace(bodies, parameters=factor * bodies.parameters, values=factor * bodies.values)
+    model = dataclasses.replace(model, components=(heavy,))
+    monkeypatch.setattr("armloop.workflows.tuning.propose_gains", lambda *_: 1 / 0)
+    with warnings.catch_warnings(record=True) as caught, pytest.raises(ZeroDivisionError):
+        warnings.simplefilter("always")
+        tune_scenario(scenario, 30.0, 60.0, model, None, silent)
+    told = [str(w.message) for w in caught if "for the model's inertia" in str(w.message)]
+    assert bool(told) == said and (not said or "at joint 3" in told[0])
