@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from armloop.cli import main
+from armloop.drake.experiments.scenarios import plant_for
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor
 from armloop.util.errors import ArmError, InputWarning
@@ -168,6 +169,9 @@ def test_what_looks_like_another_unit_is_said(tmp_path: Path, doubt: str) -> Non
 #: As exporters and authors of published URDFs leave them: what is said, and the limits of the first joint.
 AS_PUBLISHED = {
     "xacro in a comment": (GOOD + '<!-- <xacro:arm side="${side}"/> -->', None, (-2, 2, 3)),
+    "a prefix that is not declared": (
+        GOOD.replace('velocity="3"', 'velocity="3" drake:acceleration="2"') + '<drake:group name="g"/>', None, (-2, 2, 3)
+    ),
     "no speed": (GOOD.replace('velocity="3"', 'velocity="0"'), r"j1.*velocity=0 is taken for unknown", (-2, 2, np.inf)),
     "limits of nothing": (
         GOOD.replace('lower="-2" upper="2" velocity="3" effort="50"', 'lower="0" upper="0" velocity="0" effort="0"'),
@@ -195,6 +199,13 @@ def test_urdfs_are_read_as_they_are_published(tmp_path: Path, case: str) -> None
     assert (arm.n, (first.lower, first.upper, first.velocity)) == (2, limits)
     lines = [str(each.message) for each in caught]
     assert any(re.search(said, line) for line in lines) if said else not lines
+
+
+def test_names_with_a_prefix_stay_as_they_are_where_a_joint_is_locked(tmp_path: Path) -> None:
+    body = GOOD.replace('velocity="3"', 'velocity="3" drake:acceleration="2"', 1)
+    arm = load_arm(write(tmp_path / "a.urdf", body), lock={"j2": 0.1})
+    assert arm.n == 1 and 'drake:acceleration="2"' in arm.urdf
+    assert plant_for(arm).arm.n == 1  # what reads the arm's own text again
 
 
 def test_large_things_that_are_usual_are_not_said(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import hashlib
 import json
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -241,7 +242,7 @@ def mechanics_only(root: ElementTree.Element) -> str:
     """The URDF without geometry, sensors and vendor tags: meshes need not exist to load the mechanics."""
     slim = ElementTree.Element("robot", root.attrib)
     for element in (element for element in root if element.tag in ("link", "joint")):
-        copy = ElementTree.fromstring(ElementTree.tostring(element))
+        copy = deepcopy(element)
         for child in list(copy):
             if child.tag in {"visual", "collision"}:
                 copy.remove(child)

@@ -8,7 +8,9 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from pathlib import Path
+from xml.parsers import expat
 
 import numpy as np
 
@@ -48,7 +50,7 @@ def serial_chain(root: Element, path: Path, lock: Mapping[str, float], tip: str 
     Links keep their masses: what hangs on a joint that is fixed becomes part of the link it hangs on. Raises
     `ArmError` for names that are none, a locked joint that cannot move, and joints that mimic others and are not locked.
     """
-    root = ElementTree.fromstring(ElementTree.tostring(root))
+    root = deepcopy(root)
     joints = {joint.get("name", ""): joint for joint in root.findall("joint")}
     moving = [name for name, joint in joints.items() if joint.get("type") in MOVING]
     for name, value in lock.items():
@@ -93,22 +95,33 @@ def _parsed(path: Path) -> Element:
         raise ArmError(
             f"{path}: unreadable URDF: it declares a document type or entities, which are not expanded"
         )
-    unexpanded = f"{path}: holds xacro (<xacro:...> or ${{...}}); expand it first: xacro in.xacro > out.urdf"
     try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
-        if "<xacro:" in text:  # a prefix that the file does not declare
-            raise ArmError(unexpanded) from error
+        root = urdf_tree(text)
+    except expat.ExpatError as error:
         raise ArmError(f"{path}: unreadable URDF: {error}") from error
     if any(_is_xacro(element) for element in root.iter()):  # what stands in comments is nobody's
-        raise ArmError(unexpanded)
+        raise ArmError(
+            f"{path}: holds xacro (<xacro:...> or ${{...}}); expand it first: xacro in.xacro > out.urdf"
+        )
     if root.tag != "robot":
         raise ArmError(f"{path}: unreadable URDF: the root element is <{root.tag[:40]}>, it must be <robot>")
     return root
 
 
+def urdf_tree(text: str) -> Element:
+    """Root element of a URDF's text, names as they stand there: the prefix of ``drake:acceleration`` need not be declared.
+
+    URDF's parsers know no namespaces, and files that they read declare none. Raises `expat.ExpatError`.
+    """
+    tree, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = tree.start, tree.end
+    parser.CharacterDataHandler = tree.data
+    parser.Parse(text, True)
+    return tree.close()
+
+
 def _is_xacro(element: Element) -> bool:
-    return "xacro}" in element.tag or any("${" in value for value in element.attrib.values())
+    return element.tag.startswith("xacro:") or any("${" in value for value in element.attrib.values())
 
 
 def _names(root: Element, kind: str, path: Path) -> list[str]:

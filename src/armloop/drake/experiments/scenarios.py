@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 from msgspec.structs import asdict, replace
@@ -29,6 +28,7 @@ from armloop.drake.plant.fault_injection import UndeclaredEffect, realise
 from armloop.drake.plant.friction import JointFriction
 from armloop.experiment.excitation import MotionRanges, Reference
 from armloop.robot.arm import Arm, load_arm
+from armloop.robot.urdf import urdf_tree
 from armloop.schemas.scenarios import (
     LimitsData,
     PickupData,
@@ -94,7 +94,7 @@ def plant_for(spec: str | Path | Arm, friction: tuple[JointFriction, ...] | None
 def _usual_friction(arm: Arm) -> tuple[JointFriction, ...]:
     """Friction of a usual size for joints of which none is stated; says where it takes the place of a URDF's."""
     turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
-    joints = ElementTree.fromstring(arm.urdf).iter("joint") if arm.urdf else ()
+    joints = urdf_tree(arm.urdf).iter("joint") if arm.urdf else ()
     stated = {
         joint.get("name")
         for joint in joints

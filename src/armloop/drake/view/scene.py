@@ -17,6 +17,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from armloop.drake.plant.plant import add_links
 from armloop.robot.arm import Arm
+from armloop.robot.urdf import urdf_tree
 from armloop.util.quiet import quiet
 
 COLOURS = (
@@ -87,7 +88,7 @@ def _add_arm(
     """Add one arm of one colour with its base at X_WB; return its model instance."""
     if "<visual" not in arm.urdf or "<mesh" in arm.urdf:
         return _add_sticks(plant, arm, X_WB, colour, label)
-    root = ElementTree.fromstring(arm.urdf)
+    root = urdf_tree(arm.urdf)
     root.set("name", label)
     rgba = " ".join(f"{value:g}" for value in colour)
     for material in root.iter("material"):
