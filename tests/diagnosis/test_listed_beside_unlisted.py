@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from rubbing_arm import model_with_baseline, run
 
+from armloop.data.signals import smooth
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
@@ -55,8 +56,17 @@ def test_a_listed_effect_beside_a_law_is_named_as_what_it_is(
     # the law is what is left where it is not adopted, and both are the whole where it is
     alone, adopted = (each.errors()["after"][1] for each in (found, found.adopt()))
     assert adopted < 1.5 * found.evidence.scale[1] < alone
+    motion = found.samples.motion
+    written = (found.samples.tau - smooth(found.samples, found.model.predict(motion)))[found.sliding[:, 1], 1]
+    assert law.rmse == pytest.approx(alone) == pytest.approx(np.sqrt(np.mean(written**2)), rel=0.02)
     strength = found.strengths[0]
     assert strength.times > 3 and found.outcome.found[0].share > 0.2
+
+
+def test_an_effect_that_cancels_with_a_law_is_no_effect_of_its_own(model: ReconstructedModel) -> None:
+    """A cable that is taut on one side: an offset of -6 times it beside a cosine, which adds up to it."""
+    found, _ = told(model, 1, lambda q, v: np.maximum(q[:, 1], 0.0) ** 2)
+    assert (found.verdict, found.outcome.found) == ("unlisted_effect", [])
 
 
 def test_no_listed_effect_stands_in_for_a_part_of_a_law_that_is_not_met(model: ReconstructedModel) -> None:

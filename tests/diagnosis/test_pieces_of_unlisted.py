@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -294,6 +295,42 @@ class TestLawThatIsNotListed:
         nothing: Any = None
         after: Any = SimpleNamespace(score=before)
         assert unlisted._follows_a_law(nothing, after, 0)
+
+    def test_an_effect_that_another_makes_needless_does_not_stay_beside_a_law(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """An offset with three terms is likeliest at first; beside a spring, which has a rest, it does nothing."""
+        block = np.arange(40) // 4
+        offset, spring = Mock(complexity=1, indices=(0,)), Mock(complexity=2, indices=(0,))
+        columns = {offset: np.ones((40, 1)), spring: np.ones((40, 2))}
+
+        # terms, and what is left in blocks by turns
+        made = {(): (5, 1.0, 1.0), (1,): (3, 0.9, 1.1), (2,): (1, 1.09, 0.92), (1, 2): (1, 1.1, 0.9)}
+
+        def beside(given: list[Any]) -> Any:
+            terms, *left = made[tuple(each.shape[1] for each in given)]
+            return unlisted.Law([(1.0, "v1")] * terms, np.choose(block % 2, left), block)
+
+        def trial(effect: Any) -> Any:
+            return SimpleNamespace(stacked=SimpleNamespace(X=columns[effect]), shapes=[None])
+
+        stacked = SimpleNamespace(joint=np.zeros(40, dtype=int), X=np.zeros((40, 0)))
+        fit = SimpleNamespace(stacked=stacked, effects=[], shapes=[])
+        known = SimpleNamespace(fit=fit, trial=trial)
+        monkeypatch.setattr(unlisted, "Known", SimpleNamespace(of=lambda *_: known))
+        monkeypatch.setattr(unlisted, "LawSelection", lambda *_: SimpleNamespace(beside=beside))
+        monkeypatch.setattr(unlisted, "hypotheses", lambda arm: [])
+        monkeypatch.setattr(unlisted, "log_prior", lambda evidence, effects: 0.0)
+        monkeypatch.setattr(unlisted, "_leaves_far_less", lambda law, other: True)
+        bare: Any = SimpleNamespace(found=[], after=fit)
+        score = Score.of(0, np.full(40, 9.0), np.zeros(40, dtype=int), block, 1)
+        named: Any = SimpleNamespace(
+            found=[SimpleNamespace(effect=each) for each in (offset, spring)],
+            after=SimpleNamespace(score=score),
+        )
+        evidence: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
+        law, found = unlisted._with_listed(evidence, named, bare, beside([]), 0)
+        assert ([f.effect for f in found], len(law.terms)) == ([spring], 1)
 
     def test_it_is_stated_in_torques_with_the_range_of_its_samples_and_of_others(self) -> None:
         ends = np.zeros(2), np.ones(2)

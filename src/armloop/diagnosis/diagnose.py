@@ -319,9 +319,10 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     while True:
         fitted = beside = outcome
         if bare is not evidence:
-            # parameters are those beside the law; what the effects leave without it is left
+            # parameters are those beside the law, which is left where it is not adopted
             beside = refitted(bare, outcome)
-            fitted = replace(outcome, after=replace(beside.after, outside=outcome.after.outside))
+            of_law = outcome.after.stacked.y - beside.after.stacked.y
+            fitted = replace(outcome, after=replace(beside.after, outside=beside.after.outside + of_law))
         augmented = model.with_effects([*fitted.added(), *(contact.added for contact in contacts)])
         named = bool(outcome.found or contacts)
         found = Diagnosis(
@@ -335,6 +336,9 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             turned,
             strengths=strengths(bare, beside),
         )
+        if unlisted is not None and bare is not evidence:
+            rmse = found.errors()["after"][unlisted.joint - 1]
+            found = replace(found, unlisted=replace(unlisted, rmse=rmse))
         # a law accounts for what it removes, adopted or not
         left = replace(found, adopted=True).errors()["after"]
         stand = standing(evidence.only(sliding), augmented, left, known)

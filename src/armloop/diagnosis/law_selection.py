@@ -142,6 +142,9 @@ class LawSelection:
         # as an effect of which no coefficient is clear
         if not all(own.any() for own in np.split(clear, ends)):
             return Law([], y, block)
+        # effects that by themselves leave more than nothing does cancel with the law, and are a part of it
+        if ((y - given @ beta[:c]) ** 2).sum() > (y**2).sum():
+            return Law([], y, block)
         terms = [(float(b), names[t - c]) for b, t in zip(beta[c:], stable[c:], strict=True)]
         return Law(terms, error, block, errors[c:])
 

@@ -186,7 +186,7 @@ def _leaves_far_less(law: Score, other: Score) -> bool:
 def _with_listed(
     evidence: Evidence, outcome: Outcome, bare: Outcome, law: Law, j: int
 ) -> tuple[Law, list[Found]]:
-    """Forward selection of listed effects that are fitted with a law: of no more parameters together, and as good.
+    """Stepwise selection of listed effects that are fitted with a law: of no more parameters together, and as good.
 
     Args:
         law: what would be there without any.
@@ -223,6 +223,11 @@ def _with_listed(
         _, law, more = best
         found.append(more)
         parameters = sum(f.effect.complexity for f in found) + len(law.terms)
+    for each in found[:-1]:  # what was chosen before may be needless beside what came after
+        rest = [f for f in found if f is not each]
+        made = laws.beside([columns[f.effect] for f in rest])
+        if 0 < len(made.terms) <= len(law.terms) and lead(made.score, law.score) <= CHANCE:
+            law, found = made, rest
     if much_is_left(law.score).any():
         return law, []
     return law, found if law.terms and _leaves_far_less(law.score, outcome.after.score.of_joint(j)) else []
