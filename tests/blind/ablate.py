@@ -124,6 +124,7 @@ RULES = [
         (judgement, "enough"),
         (unlisted, "enough"),
     ),
+    _rule("or than what looks like it", lambda *_: False, (judgement, "exceeds_null")),
     _rule("twice that for a law that ties two joints", lambda effect: 1, (search, "_tied")),
     _rule("a coefficient is clear", lambda e, outcome: outcome, (search, "clear")),
     _rule("the likelihood ratio counts too", lambda *_: -np.inf, (judgement, "_likelier")),

@@ -10,6 +10,7 @@ import pytest
 from effect_arm import an_arm
 from numpy.testing import assert_allclose
 
+from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion
 from armloop.diagnosis import (
     contrast,
@@ -272,12 +273,13 @@ class TestWhatIsKnownOfARun:
         tau = np.zeros((40, 3))
         tau[:, 1:] = [3.0, 4.0]
         for cutoff, period in (
-            (0.5, 1 / (0.5 * evidence.INDEPENDENT)),
-            (0.1, 1 / (0.1 * evidence.INDEPENDENT)),
+            (0.5, 1 / (0.5 * INDEPENDENT)),
+            (0.1, 1 / (0.1 * INDEPENDENT)),
             (1e3, 0.25),
             (0.0, 0.25),
         ):
-            samples: Any = SimpleNamespace(motion=given, tau=tau, cutoff_hz=cutoff, reach=0.0, unknown=None)
+            samples: Any = SimpleNamespace(motion=given, tau=tau, cutoff_hz=cutoff, unknown=None)
+            samples.at_an_end = np.zeros(40, dtype=bool)
             made = Evidence.of(model, samples, [])
             assert made.context.period == pytest.approx(max(period, 0.25))
             # of a model without a baseline a hundredth of the torque; of no torque at all not nothing
@@ -285,5 +287,5 @@ class TestWhatIsKnownOfARun:
             assert_allclose(made.scale[1:], [0.03, 0.04], rtol=1e-6)
         # where a run begins nothing counts
         assert made.rows.all()
-        monkeypatch.setattr(evidence, "at_an_end", lambda samples: np.arange(40) < 3)
+        samples.at_an_end = np.arange(40) < 3
         assert Evidence.of(model, samples, []).rows.all(axis=1).tolist() == [False] * 3 + [True] * 37

@@ -232,7 +232,7 @@ class TestOutcomes:
             monkeypatch.setattr(
                 searching,
                 "is_worth",
-                lambda e, others, after, joints: worth.get((others, after, joints), True),
+                lambda e, others, after, joints, effect: worth.get((others, after, joints), True),
             )
             made = searching.pruned(nothing, self.outcome(*names))
             return "".join(f.shape for f in made.found)

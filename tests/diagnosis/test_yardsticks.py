@@ -60,14 +60,17 @@ def test_a_joint_that_gets_nowhere_has_not_slid_however_it_shakes() -> None:
     assert moving[20:40, 0].all()
 
 
-def test_where_the_filter_still_shows_how_a_run_began_or_ended_nothing_is_judged() -> None:
+def test_where_the_filter_still_shows_how_a_run_began_or_ended_nothing_is_judged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Its reach from the first and the last sample of each run; without a filter all counts."""
     time = np.array([0.0, 0.1, 0.19, 0.2, 0.39, 0.45, 0.6, 5.0, 5.15, 5.3, 5.6])
     motion = Motion(time, *np.zeros((3, 11, 2)), np.array([0, 7]))
 
     def at_an_end(reach: float) -> list[int]:
-        samples: Any = SimpleNamespace(motion=motion, reach=reach)
-        return np.flatnonzero(evidences.at_an_end(samples)).tolist()
+        monkeypatch.setattr(Samples, "reach", reach)
+        samples = Samples(motion, np.zeros((11, 2)), np.ones((11, 2), dtype=bool), 0.1)
+        return np.flatnonzero(samples.at_an_end).tolist()
 
     assert at_an_end(0.2) == [0, 1, 2, 5, 6, 7, 8, 10] and at_an_end(0.0) == []
 
@@ -219,6 +222,30 @@ BLOCK = np.repeat(np.arange(20), 10)
 def spread(size: float, seed: int = 0) -> np.ndarray:
     noise = np.random.default_rng(seed).normal(size=200)
     return noise * size / np.sqrt(np.mean(noise**2))
+
+
+@pytest.mark.parametrize(
+    ("usual", "stretches", "worth"),
+    # 2.1² - 1.2² is 2.97 baselines: of eight stretches eighteen times what they hold are no chance, of three eighty-five
+    [
+        (2.9 / 18.5, 8, True),
+        (3.1 / 18.3, 8, False),
+        (2.9 / 85, 3, True),
+        (3.1 / 85, 3, False),
+        (0.0, 8, True),
+    ],
+)
+def test_or_more_than_what_looks_like_it_in_training(usual: float, stretches: int, worth: bool) -> None:
+    law = {"removed": [4.0 * usual], "stretches": stretches}
+    effect: Any = SimpleNamespace(place=("coulomb_friction", 1, None))
+    evidence: Any = SimpleNamespace(
+        variation=np.array([3.0]), scale=np.array([2.0]), null={effect.place: law}
+    )
+    before, after = left(spread(2.1), BLOCK), left(spread(1.2), BLOCK)
+    assert is_worth(evidence, before, after, effect=effect) is worth
+    # not of a law of which nobody knows, nor where it is chance
+    assert not is_worth(evidence, before, after, effect=SimpleNamespace(place=("payload", None, None)))  # type: ignore[arg-type]
+    assert not is_worth(evidence, after, before, effect=effect)
 
 
 def test_a_gain_must_be_significant_and_more_than_the_model_itself_is_wrong_by() -> None:

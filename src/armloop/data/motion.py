@@ -200,3 +200,16 @@ class Samples:
     def reach(self) -> float:
         """Seconds to either side over which the samples' low-pass smears a step."""
         return filter_reach(self.cutoff_hz)
+
+    @property
+    def at_an_end(self) -> Mask:
+        """(N,) so near a run's start or end that the filter still shows how the arm began or ceased to move.
+
+        A controller that is switched on, a reference that begins at speed, or brakes that fall in, make it jump.
+        """
+        motion = self.motion
+        near = np.zeros(motion.samples, dtype=bool)
+        for run in motion.runs():
+            time = motion.time[run]
+            near[run] = np.minimum(time - time[0], time[-1] - time) < self.reach
+        return near

@@ -16,10 +16,9 @@ import numpy as np
 
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves, widened
 from armloop.data.creep import may_stick
-from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
-from armloop.identification.scoring import residual
+from armloop.identification.scoring import filtered_context, residual
 from armloop.identification.uncertainty import friction_spread, torque_errors
 from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.base import Place
@@ -100,13 +99,10 @@ class Evidence:
         worst = np.array([float(x or 0.0) for x in model.baseline.get("worst", [])] or [0.0])
         variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
         blocks = block_numbers(samples.motion, _block_seconds(samples.motion))
-        context = model.context(samples.motion, effects)
-        if samples.cutoff_hz > 0:
-            # Effects that ask how fine the samples are must know how fine the filter has left them.
-            context = replace(context, period=max(context.period, 1 / INDEPENDENT / samples.cutoff_hz))
+        context = filtered_context(model, samples, effects)
         rows = sliding(samples, model)
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples.motion)
-        rows &= ~at_an_end(samples)[:, None]
+        rows &= ~samples.at_an_end[:, None]
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(model, samples, scale, variation, rows, blocks, context, asked, unknown)
 
@@ -116,6 +112,12 @@ class Evidence:
         every = [*(added.effect for added in known), *self.asked]
         context = model.context(self.samples.motion, every)
         return replace(self, context=replace(context, period=self.context.period), _of_model=_Columns())
+
+    @cached_property
+    def null(self) -> dict[Place, dict[str, Any]]:
+        """What each law removes of the model's residual on its training runs, by its place; none that nobody asked."""
+        known = self.model.baseline.get("null", ())
+        return {(law["effect"], law["joint"], law.get("other_joint")): law for law in known}
 
     @cached_property
     def fold(self) -> Index:
@@ -241,19 +243,6 @@ def fastest(model: ReconstructedModel) -> Array:
 def sticking(model: ReconstructedModel) -> Array:
     """(n,) speed of each joint, rad/s (m/s), below which it may stick; the level of its friction is that at this speed."""
     return may_stick(fastest(model))
-
-
-def at_an_end(samples: Samples) -> Mask:
-    """(N,) samples so near a run's start or end that the filter still shows how the arm began or ceased to move.
-
-    A controller that is switched on, a reference that begins at speed, or brakes that fall in, make it jump.
-    """
-    motion = samples.motion
-    near = np.zeros(motion.samples, dtype=bool)
-    for run in motion.runs():
-        time = motion.time[run]
-        near[run] = np.minimum(time - time[0], time[-1] - time) < samples.reach
-    return near
 
 
 def far_outside(motion: Motion, ranges: Any) -> Mask:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.score import Score
+from armloop.laws.effects import Effect
 from armloop.util.arrays import Array, Mask
 
 #: What is no chance: so many standard errors. An effect must lower the held-out error by as many (over blocks), and,
 #: over its joints together, by the energy that the model leaves on the worst tenth of its own baseline: a run may be all
-#: of such motion, and a law that fits a model's shortcomings is easily found.
+#: of such motion, and a law that fits a model's shortcomings is easily found. It may be less where the model is known to
+#: have hardly any that look like this effect.
 SIGNIFICANCE = 3.0
 #: What is behind by no more than this many standard errors is as good …
 CHANCE = 2.0
@@ -32,14 +36,32 @@ def gain(current: Score, trial: Score) -> float:
     return current.error - trial.error
 
 
-def is_worth(evidence: Evidence, current: Score, trial: Score, joints: int = 1) -> bool:
-    """Whether the gain is significant over blocks and larger than the model's own shortcomings of so many joints.
+def is_worth(
+    evidence: Evidence, current: Score, trial: Score, joints: int = 1, effect: Effect | None = None
+) -> bool:
+    """Whether the gain is significant over blocks and larger than the model's own shortcomings of so many joints, or than
+    what of these looks like the effect.
 
     A law that ties joints together may take what the model gets wrong of any of them.
     """
     if gain(current, trial) <= 0 or lead(current, trial) <= SIGNIFICANCE:
         return False
-    return times_enough(evidence, current, trial) > joints
+    if times_enough(evidence, current, trial) > joints:
+        return True
+    return effect is not None and exceeds_null(evidence, current, trial, effect)
+
+
+def exceeds_null(evidence: Evidence, current: Score, trial: Score, effect: Effect) -> bool:
+    """Whether an effect removes more than it does of the model's residual on stretches of its training runs.
+
+    Their mean square is known from few: by Student's t of as many degrees of freedom it must be no chance.
+    """
+    known = evidence.null.get(effect.place)
+    if known is None:
+        return False
+    removed = ((current.energy - trial.energy) / np.maximum(current.rows, 1)).sum()
+    usual = (np.asarray(known["removed"]) / evidence.scale**2).sum()
+    return bool(removed > student.isf(norm.sf(SIGNIFICANCE), known["stretches"]) ** 2 * usual)
 
 
 def times_enough(evidence: Evidence, current: Score, trial: Score) -> float:

@@ -357,8 +357,8 @@ def without_effects_at(evidence: Evidence, outcome: Outcome, joint: int) -> Outc
 def pruned(evidence: Evidence, outcome: Outcome) -> Outcome:
     """The outcome without effects that are worth nothing beside the others."""
     for k in range(len(outcome.found)):
-        fewer = _with_only(evidence, outcome, _others(outcome.found, k))
-        if not is_worth(evidence, fewer.after.score, outcome.after.score, _tied(outcome.found[k].effect)):
+        fewer, effect = _with_only(evidence, outcome, _others(outcome.found, k)), outcome.found[k].effect
+        if not is_worth(evidence, fewer.after.score, outcome.after.score, _tied(effect), effect):
             return pruned(evidence, fewer)
     return outcome
 

@@ -7,13 +7,15 @@ limits), so standstill says little about a model and is never mixed into the fig
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
+from armloop.laws.effects import Context, Effect
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Mask
 
@@ -42,6 +44,14 @@ class Score:
 def residual(model: ReconstructedModel, samples: Samples) -> Array:
     """(N, n) measured minus predicted torque, both through the same filter."""
     return samples.tau - smooth(samples, model.predict(samples.motion))
+
+
+def filtered_context(model: ReconstructedModel, samples: Samples, effects: Sequence[Effect]) -> Context:
+    """What effects may look at on conditioned samples, with a period as fine as the filter has left them."""
+    context = model.context(samples.motion, effects)
+    if samples.cutoff_hz > 0:
+        context = replace(context, period=max(context.period, 1 / INDEPENDENT / samples.cutoff_hz))
+    return context
 
 
 def score(model: ReconstructedModel, samples: Samples, rows: Mask | None = None) -> Score:

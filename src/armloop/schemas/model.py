@@ -155,6 +155,16 @@ class EnergyPartsData(Struct, forbid_unknown_fields=True):
     separated: bool = True
 
 
+class NullData(Struct):
+    """What a law removes of the model's residual on stretches of its own training runs, per joint, N²·m² (N²) a sample."""
+
+    effect: Text
+    joint: JointNumber | None
+    removed: PerJoint
+    stretches: Count
+    other_joint: JointNumber | None = None
+
+
 class BaselineData(Struct):
     """What the model leaves on left-out data of its own training runs, per joint; a field that is not known is left away."""
 
@@ -166,6 +176,7 @@ class BaselineData(Struct):
     creeping: PerJointOrNull | UnsetType = UNSET
     samples: Count | UnsetType = UNSET
     joints: Annotated[list[EnergyPartsData], Meta(max_length=MOST_JOINTS)] | UnsetType = UNSET
+    null: Annotated[list[NullData], Meta(max_length=100_000)] | UnsetType = UNSET
 
 
 class LogZerosData(Struct):
@@ -324,6 +335,10 @@ def _agree(model: ModelData) -> None:
             for key in ("rmse", "rms", "nrmse", "worst", "reversals", "creeping")
         ),
         ("baseline.joints", model.baseline.joints or UNSET),  # without parts there are none
+        *(
+            (f"baseline.null: removed of {law.effect!r:.60}", law.removed)
+            for law in model.baseline.null or ()
+        ),
         *((f"history.range[{k + 1}]", row) for k, row in enumerate(ranges)),
         ("history.slowest", history.slowest),
         ("history.encoder_zeros.spread", UNSET if zeros is UNSET else zeros.spread),

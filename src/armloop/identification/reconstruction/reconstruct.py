@@ -15,6 +15,7 @@ from armloop.data.signals import Conditioning
 from armloop.dynamics.physics import check_physics
 from armloop.identification.goodness import Parts, merged, parts_of, witness
 from armloop.identification.goodness.features import Scales
+from armloop.identification.goodness.null import SECONDS, STRETCHES, empirical_null
 from armloop.identification.goodness.witness import MOST, Witness
 from armloop.identification.reconstruction.bandwidth import check_nyquist
 from armloop.identification.reconstruction.data import Chunk, Data
@@ -273,6 +274,10 @@ def _finished(
         model = replace(model, **{name: getattr(last, name) for name in names})
     whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
     model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
+    if ready.options.parts:
+        progress("what the laws of the catalogue find in what the model leaves")
+        window = data.window(round(STRETCHES * SECONDS / data.reference.samples.period), STRETCHES)
+        model = replace(model, baseline={**model.baseline, "null": empirical_null(model, window.samples)})
     checks = check_physics(model)
     notes += checks.faults()
     history = {**model.history, "physics": checks.to_dict(), "notes": notes}

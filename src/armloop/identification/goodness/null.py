@@ -1,0 +1,88 @@
+"""Empirical null distribution (Efron 2004): what laws of the catalogue remove of a model's residual on its training runs.
+
+What a model gets wrong looks a little like one law or another. A law that a later run shows must remove more than that.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from armloop.data.motion import Samples
+from armloop.data.signals import independent_rows, smooth
+from armloop.identification.scoring import filtered_context, residual
+from armloop.laws.effects import hypotheses
+from armloop.laws.effects.base import entry
+from armloop.model import ReconstructedModel
+from armloop.regression.embedded import RIDGE
+from armloop.util.arrays import TINY, Array, Index, Mask
+
+#: Length of a stretch, s, and how many there are at most; of fewer than the third nothing is known.
+SECONDS, STRETCHES, _FEWEST = 10.0, 8, 3
+#: Rows of a joint that a stretch tells of.
+_ROWS = 20
+
+
+def empirical_null(model: ReconstructedModel, samples: Samples) -> list[dict[str, Any]]:
+    """Mean square that each law of the catalogue removes of a model's residual, over stretches of runs.
+
+    Each law is fitted to each stretch by itself, with whichever of its shapes removes most there.
+
+    Args:
+        samples: training runs, conditioned.
+
+    Returns:
+        Per law its name and joints, ``removed`` (n,), N²·m² (N²) a sample of each joint, and the number of ``stretches``;
+        none of laws that fewer than three could show.
+    """
+    if samples.cutoff_hz <= 0:
+        return []
+    effects = hypotheses(model.arm)
+    context = filtered_context(model, samples, effects)
+    left, stretches = residual(model, samples), _stretches(samples)
+    if len(stretches) < _FEWEST:
+        return []
+    counted = np.zeros_like(samples.moving)
+    counted[np.concatenate(stretches)] = True
+    counted &= samples.moving
+    scale = np.sqrt((left**2 * counted).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)) + TINY
+    found = []
+    for effect in effects:
+        own = [
+            rows for rows in stretches if (counted[rows][:, list(effect.indices)].sum(axis=0) >= _ROWS).all()
+        ]
+        if len(own) < _FEWEST:
+            continue
+        best = np.zeros((len(own), model.arm.n))
+        for shape in effect.shapes(context):
+            columns = smooth(samples, effect.columns(context, shape))
+            for k, rows in enumerate(own):
+                X = effect.on_all_joints(columns[rows], model.arm.n) / scale[:, None]
+                removed = _removed(X, left[rows] / scale, counted[rows])
+                best[k] = max(best[k], removed, key=np.sum)
+        found.append(
+            {
+                **entry(*effect.place),
+                "removed": (best.mean(axis=0) * scale**2).tolist(),
+                "stretches": len(own),
+            }
+        )
+    return found
+
+
+def _stretches(samples: Samples) -> list[Index]:
+    """Rows of stretches of the runs, one after the other, as many as the filter has left something of their own to say."""
+    rows = np.flatnonzero(independent_rows(samples) & ~samples.at_an_end)
+    return np.array_split(rows, max(1, round(samples.motion.seconds / SECONDS)))
+
+
+def _removed(X: Array, y: Array, counted: Mask) -> Array:
+    """(n,) mean square that columns (N, n, p) remove of each joint of y (N, n), fitted to all counted samples at once."""
+    A, b = X[counted], y[counted]
+    size = np.maximum(np.linalg.norm(A, axis=0), TINY)
+    A = A / size
+    after = np.zeros_like(y)
+    after[counted] = b - A @ np.linalg.solve(A.T @ A + RIDGE * np.eye(A.shape[1]), A.T @ b)
+    gained = np.where(counted, y**2 - after**2, 0.0).sum(axis=0)
+    return np.asarray(gained / np.maximum(counted.sum(axis=0), 1))
