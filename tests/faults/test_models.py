@@ -118,6 +118,12 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     (("baseline", "rmse"), [None, [1.0], [-1.0] * 3, ["a"] * 3, 3, [1e300] * 3], "rmse"),
     (("baseline", "nrmse"), [None], r"baseline\.nrmse is None; it must be a list"),
     (("baseline", "worst"), [None], r"baseline\.worst is None; it must be a list"),
+    (("baseline", "null"), [None, "x", [{"effect": "payload", "joint": None, "stretches": 8}]], "null"),
+    (
+        ("baseline", "null"),
+        [[{"effect": "payload", "joint": None, "removed": [1.0], "stretches": 8}]],
+        "removed of 'payload'",
+    ),
     (("baseline", "joints"), [None, "x", [{}] * 3, [{"joint": 1}], [{"joint": 1, "x": 0}] * 3], "joints"),
     (("history",), [None, [], "x", ...], "history"),
     (("history", "logs"), [3, "run", [3], {}], "logs"),
