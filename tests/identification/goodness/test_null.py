@@ -85,6 +85,17 @@ def test_runs_are_cut_into_stretches_of_ten_seconds_or_so(runs: int, seconds: fl
     assert np.ptp([len(rows) for rows in found]) <= 1
 
 
+def test_what_is_recorded_ten_times_as_often_tells_the_same() -> None:
+    given = samples([0.3, -0.3, 0.6, 0.0])
+    thin = null._thinned(replace(given, cutoff_hz=1.0))
+    assert thin.period == pytest.approx(0.1) and thin.motion.samples == pytest.approx(
+        given.motion.samples / 10, abs=4
+    )
+    assert len(thin.motion.runs()) == 4 and (np.diff(thin.motion.time) < 0).sum() == 3
+    np.testing.assert_array_equal(thin.tau[:3], given.tau[:30:10])
+    assert null._thinned(given).motion.samples == given.motion.samples
+
+
 def test_columns_are_fitted_to_all_joints_at_once() -> None:
     y, counted = (
         np.array([[1.0, 3.0], [1.0, 3.0], [9.0, 9.0]]),
