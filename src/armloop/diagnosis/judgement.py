@@ -61,7 +61,7 @@ def exceeds_null(evidence: Evidence, current: Score, trial: Score, effect: Effec
         return False
     removed = ((current.energy - trial.energy) / np.maximum(current.rows, 1)).sum()
     usual = (np.asarray(known["removed"]) / evidence.scale**2).sum()
-    return bool(removed > student.isf(norm.sf(SIGNIFICANCE), known["stretches"]) ** 2 * usual)
+    return bool(removed > student.isf(norm.sf(SIGNIFICANCE), known["stretches"]) ** 2 * usual > 0)
 
 
 def times_enough(evidence: Evidence, current: Score, trial: Score) -> float:

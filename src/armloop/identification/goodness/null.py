@@ -64,13 +64,10 @@ def empirical_null(model: ReconstructedModel, samples: Samples) -> list[dict[str
                 X = effect.on_all_joints(columns[rows], model.arm.n) / scale[:, None]
                 removed = _removed(X, left[rows] / scale, counted[rows])
                 best[k] = max(best[k], removed, key=np.sum)
-        found.append(
-            {
-                **entry(*effect.place),
-                "removed": (best.mean(axis=0) * scale**2).tolist(),
-                "stretches": len(own),
-            }
-        )
+        shown = best[best.sum(axis=1) > 0]  # where its columns are nothing it was not seen to remove nothing
+        if len(shown) >= _FEWEST:
+            removed = (shown.mean(axis=0) * scale**2).tolist()
+            found.append({**entry(*effect.place), "removed": removed, "stretches": len(shown)})
     return found
 
 
