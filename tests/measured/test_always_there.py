@@ -70,6 +70,7 @@ def test_a_coupled_wrist_is_found_and_named(
         assert found.held_out.moving["rmse"][joint] < 1.3 * clean.held_out.moving["rmse"][joint]
 
 
+@pytest.mark.long
 def test_a_panda_has_none(measured: Path) -> None:
     found = made([read_log(measured / "panda" / "exciting_1a.csv")], measured / "panda" / "panda.urdf")
     assert [a.effect.name for a in found.model.effects if a.effect.name != "torque_ripple"] == []

@@ -52,6 +52,7 @@ def test_friction_and_mass_matrix_of_one_arm(tmp_path: Path) -> None:
     check(1, 2, 30.0, tmp_path)
 
 
+@pytest.mark.long
 def test_joints_that_never_go_fast(tmp_path: Path) -> None:
     """Two that turn at two degrees a second, and one that slides a centimetre in a second."""
     made = random_arm(33, 3, sliding=True)
