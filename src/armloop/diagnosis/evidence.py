@@ -115,7 +115,7 @@ class Evidence:
 
     @cached_property
     def null(self) -> dict[Place, dict[str, Any]]:
-        """What each law removes of the model's residual on its training runs, by its place; none that nobody asked."""
+        """What each law removes of the model's residual on left-out blocks of its training runs, by its place."""
         known = self.model.baseline.get("null", ())
         return {(law["effect"], law["joint"], law.get("other_joint")): law for law in known}
 

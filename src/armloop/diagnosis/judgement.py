@@ -52,7 +52,7 @@ def is_worth(
 
 
 def exceeds_null(evidence: Evidence, current: Score, trial: Score, effect: Effect) -> bool:
-    """Whether an effect removes more than it does of the model's residual on stretches of its training runs.
+    """Whether an effect removes more than it does of the model's residual on left-out stretches of its training runs.
 
     Their mean square is known from few: by Student's t of as many degrees of freedom it must be no chance.
     """

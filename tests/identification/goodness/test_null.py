@@ -1,6 +1,7 @@
 """What laws remove of a residual that is none of theirs: little of noise, much of what looks like them."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from synthetic import fourier_motion, measured, rigid_torque, three_axis
 from armloop.data.motion import Samples
 from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.goodness import null
+from armloop.laws.effects import Context, Effect, effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
@@ -33,13 +35,18 @@ def samples(levels: list[float], seconds: float = 10.0, noise: float = 0.0) -> S
     return preprocess(logs, Conditioning())
 
 
-def removed(found: list[dict[str, object]], effect: str, joint: int | None) -> np.ndarray:
+def null_of(given: Samples, left_out: np.ndarray | None = None) -> list[dict[str, Any]]:
+    every = np.ones(given.motion.samples, dtype=bool)
+    return null.empirical_null(model(), given, every if left_out is None else left_out)
+
+
+def removed(found: list[dict[str, Any]], effect: str, joint: int | None) -> np.ndarray:
     (own,) = [law for law in found if (law["effect"], law["joint"]) == (effect, joint)]
     return np.asarray(own["removed"])
 
 
 def test_what_a_law_removes_is_the_mean_square_of_what_looks_like_it() -> None:
-    found = null.empirical_null(model(), samples([0.3, -0.3, 0.6, 0.0]))
+    found = null_of(samples([0.3, -0.3, 0.6, 0.0]))
     mine = removed(found, "coulomb_friction", 2)
     # the direction, filtered, is a little less than one; elsewhere there is nothing
     assert mine[1] == pytest.approx((0.09 + 0.09 + 0.36) / 4, rel=0.15)
@@ -52,15 +59,15 @@ def test_what_a_law_removes_is_the_mean_square_of_what_looks_like_it() -> None:
 
 
 def test_of_noise_a_law_removes_its_part_alone() -> None:
-    found = null.empirical_null(model(), samples([0.0] * 4, noise=0.5))
+    found = null_of(samples([0.0] * 4, noise=0.5))
     given = samples([0.0] * 4, noise=0.5)
     energy = np.mean((given.tau - model().predict(given.motion)) ** 2)
     assert 0 < removed(found, "coulomb_friction", 2)[1] < 0.05 * energy
 
 
 def test_of_fewer_than_three_stretches_or_instants_out_of_time_nothing_is_known() -> None:
-    assert null.empirical_null(model(), samples([0.3, 0.3])) == []
-    assert null.empirical_null(model(), replace(samples([0.3] * 4), cutoff_hz=0.0)) == []
+    assert null_of(samples([0.3, 0.3])) == []
+    assert null_of(replace(samples([0.3] * 4), cutoff_hz=0.0)) == []
 
 
 def test_of_a_joint_that_moves_in_too_few_stretches_nothing_is_known() -> None:
@@ -68,32 +75,72 @@ def test_of_a_joint_that_moves_in_too_few_stretches_nothing_is_known() -> None:
     moving = given.moving.copy()
     for run in given.motion.runs()[:2]:
         moving[run, 0] = False
-    found = null.empirical_null(model(), replace(given, moving=moving))
+    found = null_of(replace(given, moving=moving))
     assert {law["joint"] for law in found if law["effect"] == "coulomb_friction"} == {2, 3}
+
+
+def test_of_a_law_whose_columns_are_nothing_in_too_few_stretches_nothing_is_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As of an end stop that no run has reached."""
+    kind = type(effect("coulomb_friction", 2))
+    columns = kind.columns
+
+    def seldom(self: Effect, context: Context, shape: float) -> np.ndarray:
+        found = columns(self, context, shape)
+        there = np.arange(len(found)) >= context.motion.starts[2]
+        return found * there[:, None] if self.joint == 2 else found
+
+    monkeypatch.setattr(kind, "columns", seldom)
+    found = null_of(samples([0.3] * 4))
+    joints = {law["joint"]: law["stretches"] for law in found if law["effect"] == "coulomb_friction"}
+    assert joints == {1: 4, 3: 4}
+
+
+def test_blocks_that_were_fitted_tell_nothing() -> None:
+    """But for what the filter brings in of them."""
+    given = samples([0.3, -0.3, 0.6, 0.2], 20.0)
+    time = given.motion.time
+    left_out = (time % 10.0) >= 3.0
+    spoilt = given.tau.copy()
+    spoilt[~left_out] += 5.0 * np.sign(given.motion.v[~left_out])
+    one, other = (null_of(replace(given, tau=tau), left_out) for tau in (given.tau, spoilt))
+    assert {law["stretches"] for law in one} == {6} and one == other
 
 
 @pytest.mark.parametrize(
     ("runs", "seconds", "pieces"), [(3, 10.0, 3), (2, 14.0, 3), (1, 31.0, 3), (8, 4.0, 3)]
 )
-def test_runs_are_cut_into_stretches_of_ten_seconds_or_so(runs: int, seconds: float, pieces: int) -> None:
+def test_blocks_make_stretches_of_ten_seconds_or_so(runs: int, seconds: float, pieces: int) -> None:
     """However short the runs are."""
     given = samples([0.3] * runs, seconds)
-    found = null._stretches(given)
+    found = null._stretches(given, np.ones(given.motion.samples, dtype=bool))
     assert len(found) == pieces
     together = np.concatenate(found)
     assert (np.diff(together) > 0).all() and not given.at_an_end[together].any()
     assert np.ptp([len(rows) for rows in found]) <= 1
 
 
-def test_what_is_recorded_ten_times_as_often_tells_the_same() -> None:
-    given = samples([0.3, -0.3, 0.6, 0.0])
-    thin = null._thinned(replace(given, cutoff_hz=1.0))
-    assert thin.period == pytest.approx(0.1) and thin.motion.samples == pytest.approx(
-        given.motion.samples / 10, abs=4
-    )
-    assert len(thin.motion.runs()) == 4 and (np.diff(thin.motion.time) < 0).sum() == 3
-    np.testing.assert_array_equal(thin.tau[:3], given.tau[:30:10])
-    assert null._thinned(given).motion.samples == given.motion.samples
+def test_a_block_is_a_run_with_the_filters_reach_on_either_side_and_thinned() -> None:
+    given = replace(samples([0.3, -0.3], 40.0), cutoff_hz=1.0)
+    time, first = given.motion.time, given.motion.starts[1]
+    left_out = (time >= 15.0) & (time < 20.0)
+    left_out[:first] |= (time[:first] >= 30.0) & (time[:first] < 35.0)
+    cut, own = null._around(given, left_out)
+    runs = cut.motion.runs()
+    assert len(runs) == 3 and cut.period == pytest.approx(0.1)
+    for run, start in zip(runs, (15.0, 30.0, 15.0), strict=True):
+        assert cut.motion.time[run][own[run]] == pytest.approx(start + 0.1 * np.arange(50), abs=0.11)
+        assert cut.motion.time[run][0] == pytest.approx(start - given.reach, abs=0.02)
+        assert not cut.at_an_end[run][own[run]].any()
+        # a law of time goes on from where its log began
+        assert cut.motion.elapsed[run] == pytest.approx(cut.motion.time[run] - time[0], abs=0.5)
+
+
+def test_of_many_blocks_some_are_asked() -> None:
+    given = samples([0.3] * 8, 80.0)
+    cut, own = null._around(given, np.ones(given.motion.samples, dtype=bool))
+    assert len(cut.motion.runs()) == 2 and own.all()
 
 
 def test_columns_are_fitted_to_all_joints_at_once() -> None:

@@ -1,6 +1,7 @@
-"""Empirical null distribution (Efron 2004): what laws of the catalogue remove of a model's residual on its training runs.
+"""Empirical null distribution (Efron 2004): what laws of the catalogue remove of a model's residual on left-out blocks.
 
-What a model gets wrong looks a little like one law or another. A law that a later run shows must remove more than that.
+What a model gets wrong looks a little like one law or another. A law that a later run shows must remove more than that. Of
+blocks that were fitted the model has taken up most of what looks like its own laws.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from armloop.data.blocks import widened
 from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.scoring import filtered_context, residual
@@ -18,22 +20,24 @@ from armloop.laws.effects.base import entry
 from armloop.model import ReconstructedModel
 from armloop.regression.embedded import RIDGE
 from armloop.util.arrays import TINY, Array, Index, Mask
+from armloop.util.arrays import stretches as intervals
 
-#: Length of a stretch, s, and how many there are at most; of fewer than the third nothing is known.
-SECONDS, STRETCHES, _FEWEST = 10.0, 8, 3
+#: What blocks together make a stretch, s; how many of them there are at most, and at the fewest.
+_SECONDS, _MOST, _FEWEST = 10.0, 16, 3
 #: Rows of a joint that a stretch tells of.
 _ROWS = 20
 #: Samples per period of the filter's corner: what it lets pass is as good in so many.
 _FINE = 10
 
 
-def empirical_null(model: ReconstructedModel, samples: Samples) -> list[dict[str, Any]]:
-    """Mean square that each law of the catalogue removes of a model's residual, over stretches of runs.
+def empirical_null(model: ReconstructedModel, samples: Samples, left_out: Mask) -> list[dict[str, Any]]:
+    """Mean square that each law of the catalogue removes of a model's residual, over stretches of left-out blocks.
 
     Each law is fitted to each stretch by itself, with whichever of its shapes removes most there.
 
     Args:
         samples: training runs, conditioned.
+        left_out: (N,) those of them that the model was not fitted to, in blocks.
 
     Returns:
         Per law its name and joints, ``removed`` (n,), N²·m² (N²) a sample of each joint, and the number of ``stretches``;
@@ -41,11 +45,12 @@ def empirical_null(model: ReconstructedModel, samples: Samples) -> list[dict[str
     """
     if samples.cutoff_hz <= 0:
         return []
-    effects, samples = hypotheses(model.arm), _thinned(samples)
-    context = filtered_context(model, samples, effects)
-    left, stretches = residual(model, samples), _stretches(samples)
+    samples, left_out = _around(samples, left_out)
+    stretches = _stretches(samples, left_out)
     if len(stretches) < _FEWEST:
         return []
+    effects = hypotheses(model.arm)
+    context, left = filtered_context(model, samples, effects), residual(model, samples)
     counted = np.zeros_like(samples.moving)
     counted[np.concatenate(stretches)] = True
     counted &= samples.moving
@@ -71,21 +76,31 @@ def empirical_null(model: ReconstructedModel, samples: Samples) -> list[dict[str
     return found
 
 
-def _thinned(samples: Samples) -> Samples:
-    """The same at a lower rate, no run's samples further apart than a part of the period of the filter's corner."""
-    motion, stride = samples.motion, max(1, int(1 / (_FINE * samples.cutoff_hz * samples.period)))
-    rows = np.concatenate([np.arange(run.start, run.stop, stride) for run in motion.runs()])
-    taken = motion.take(rows, np.searchsorted(rows, motion.starts))
+def _around(samples: Samples, left_out: Mask) -> tuple[Samples, Mask]:
+    """Left-out blocks as runs of their own with the filter's reach on either side, thinned to what the filter lets pass."""
+    motion, reach = samples.motion, int(np.ceil(samples.reach / samples.period))
+    near = widened(left_out[:, None], motion, reach)[:, 0]
+    stride = max(1, int(1 / (_FINE * samples.cutoff_hz * samples.period)))
+    pieces = [
+        np.arange(run.start + first, run.start + end, stride)
+        for run in motion.runs()
+        for first, end in intervals(near[run]).tolist()
+    ]
+    pieces = pieces[:: max(1, round(left_out.sum() * samples.period / (_MOST * _SECONDS)))]
+    rows = np.concatenate([np.zeros(0, dtype=np.intp), *pieces])
+    starts = np.cumsum([0, *map(len, pieces)])[:-1]
+    # a law of time goes on from where its log began
+    taken = replace(motion.take(rows, starts), begins=(motion.time - motion.elapsed)[rows[starts]])
     tau, moving = samples.tau[rows], samples.moving[rows]
-    return replace(
-        samples, motion=taken, tau=tau, moving=moving, period=stride * samples.period, unknown=None
-    )
+    period = stride * samples.period
+    thinned = replace(samples, motion=taken, tau=tau, moving=moving, period=period, spans=None, unknown=None)
+    return thinned, left_out[rows]
 
 
-def _stretches(samples: Samples) -> list[Index]:
-    """Rows of stretches of the runs, one after the other, as many as the filter has left something of their own to say."""
-    rows = np.flatnonzero(independent_rows(samples) & ~samples.at_an_end)
-    return np.array_split(rows, max(1, round(samples.motion.seconds / SECONDS)))
+def _stretches(samples: Samples, left_out: Mask) -> list[Index]:
+    """Left-out rows in stretches of blocks, as many as the filter has left something of their own to say."""
+    rows = np.flatnonzero(left_out & independent_rows(samples) & ~samples.at_an_end)
+    return np.array_split(rows, max(1, round(left_out.sum() * samples.period / _SECONDS)))
 
 
 def _removed(X: Array, y: Array, counted: Mask) -> Array:

@@ -233,12 +233,12 @@ class Data:
             return replace(self, parts=[self.reference])
         return replace(self, parts=self.parts[:: max(1, -(-len(self.parts) // count))])
 
-    def window(self, most: int, stretches: int = _STRETCHES) -> Chunk:
+    def window(self, most: int) -> Chunk:
         """All samples where there are no more, else stretches of consecutive ones, evenly, about so many together."""
         if self.in_memory and self.reference.samples.motion.samples <= most:
             return self.reference
-        some = self.sampled(stretches).parts
-        each = -(-stretches // len(some))
+        some = self.sampled(_STRETCHES).parts
+        each = -(-_STRETCHES // len(some))
         length = max(1, most // (each * len(some)))
         cut = partial(_on_chunk, partial(_stretches, count=each, length=length))
         return _joined(list(chain.from_iterable(self.workers.map(cut, some))))
