@@ -113,9 +113,9 @@ def test_of_streamed_logs_one_piece_lies_in_memory_at_a_time(
         return found
 
     monkeypatch.setattr(conditioned, "chunk", counted)
+    # Not by their names alone, one of which is a function's, too.
     for user in ("fitted", "training", "reconstruct"):
-        monkeypatch.setattr(f"{room}.{user}.WINDOW", 600)
-    # Not by its name alone, which is its function's, too.
+        monkeypatch.setattr(sys.modules[f"{room}.{user}"], "WINDOW", 600)
     monkeypatch.setattr(sys.modules[f"{room}.reconstruct"], "_RIPPLE", 600)
     half = logs[0].samples // 2
     pieces = [log.select(rows) for log in logs[:2] for rows in (slice(None, half), slice(half, None))]
