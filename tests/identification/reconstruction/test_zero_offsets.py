@@ -12,7 +12,7 @@ from synthetic import measured as recorded
 
 from armloop.data.log import MotionLog, read_log
 from armloop.data.signals import preprocess
-from armloop.identification.reconstruction import reconstruct, zero_offsets
+from armloop.identification.reconstruction import reconstruct, stance_angles, zero_offsets
 from armloop.identification.reconstruction.mounting import Mounting
 from armloop.identification.reconstruction.plain_fits import Fit
 from armloop.identification.reconstruction.stances import Stance
@@ -175,3 +175,16 @@ def test_measured_arms_have_the_urdfs_zeros_but_where_that_is_turned(measured: P
         assert all(abs(angle) < 0.03 for angle in found.values())
     with pytest.raises(LogError, match=r"joint 2 counts from another zero .* give q2 \+ 1\.57"):
         check_torques([log], arm.with_zero(1, -np.pi / 2), 8.0)
+
+
+def test_no_step_is_longer_than_the_slopes_are_good_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    offs = iter([3.0, -0.1, 1e-6])
+    step = lambda problem, stances: ([1], np.array([next(offs)]), np.eye(1) * 1e-4)  # noqa: E731
+    monkeypatch.setattr(stance_angles, "_step", step)
+    problem: Any = SimpleNamespace(
+        arm=SimpleNamespace(with_zero=lambda joint, angle: None), as_of=lambda arm: None
+    )
+    (found,) = stance_angles.refined(problem, [ZeroOffset(1, 0.0, np.inf)])
+    assert found.angle == pytest.approx(0.4 - 0.1, abs=1e-5) and found.std_error == pytest.approx(0.01)
+    # it ends once steps are short
+    assert next(offs, None) is None
