@@ -55,10 +55,12 @@ def test_a_law_that_fades_in_by_itself_does_so_over_its_own_speed() -> None:
     register(Fading)
     try:
         own = EffectTorque(ARM, "fading", 2, {"level": 2.0, "speed": 0.5}, smoothing=0.01)
+        sharp = EffectTorque(ARM, "fading", 2, {"level": 2.0, "speed": 1e-3}, smoothing=0.01)
         listed = EffectTorque(ARM, "coulomb_friction", 2, {"level": 2.0}, smoothing=0.01)
     finally:
         REGISTRY.forget()
-    for system, width in ((own, 0.5), (listed, 0.01)):
+    # over less than the smoothing it fades in over that
+    for system, width in ((own, 0.5), (sharp, 0.01), (listed, 0.01)):
         context = system.CreateDefaultContext()
         system.GetInputPort("state").FixValue(context, [0.0, 0.0, 0.0, 9.0, 0.02, 9.0])
         tau = system.GetOutputPort("tau").Eval(context)
