@@ -69,6 +69,9 @@ def test_a_law_has_the_shape_that_removes_most_of_each_stretch(monkeypatch: pyte
         monkeypatch.setattr(kind, "shapes", lambda self, context, shape=shape: [shape])
         each.append(removed(null_of(given), "stribeck_friction", 2).sum())
     assert max(each) * 0.999 < whole and max(each) > 1.1 * min(each)
+    # in whichever order they are tried
+    monkeypatch.setattr(kind, "shapes", lambda self, context: tried[::-1])
+    assert removed(null_of(given), "stribeck_friction", 2).sum() == pytest.approx(whole)
 
 
 def test_of_noise_a_law_removes_its_part_alone() -> None:
