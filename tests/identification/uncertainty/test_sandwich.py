@@ -53,6 +53,35 @@ def test_the_covariance_is_that_of_refits_without_one_block():
     np.testing.assert_allclose(sums.step(), 0.0, atol=1e-8)
 
 
+def test_a_step_without_a_block_is_the_regression_of_the_others():
+    data = two_steps()
+    theta, sums = equations(*data)
+    block, rest = data[0], data[1:]
+    for b in (0, 5, 20):
+        np.testing.assert_allclose(theta + sums.step_without(b), solve(block != b, *rest), atol=2e-3)
+    # what that block alone tells of stays, and what it shares with others is theirs
+    jacobian, score = np.zeros((2, 2, 2)), np.array([[0.5, -3.0], [-0.5, 0.0]])
+    jacobian[0], jacobian[1, 0, 0] = np.diag([1.0, 2.0]), 1.0
+    alone = Equations(jacobian, score, np.ones((2, 2)), np.zeros(2, int), np.ones(2))
+    np.testing.assert_allclose(alone.step_without(0), [-0.5, 0.0], atol=0.02)
+    np.testing.assert_allclose(alone.step_without(1), [0.5, -1.5], atol=0.02)
+
+
+def test_blocks_without_samples_are_no_blocks():
+    data = two_steps()
+    _, sums = equations(*data)
+    empty = np.zeros_like(sums.count[:1])
+    more = Equations(
+        np.concatenate([sums.jacobian, np.zeros((1, 3, 3))]),
+        np.concatenate([sums.score, empty]),
+        np.concatenate([sums.count, empty]),
+        sums.stage,
+        sums.variance,
+    )
+    assert more.blocks == sums.blocks + 1 and more.met.blocks == sums.blocks
+    np.testing.assert_array_equal(more.met.covariance(), sums.covariance())
+
+
 def test_what_a_step_inherits_adds_to_its_uncertainty():
     data = two_steps()
     _, sums = equations(*data)

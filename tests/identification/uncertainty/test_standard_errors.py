@@ -199,7 +199,7 @@ def test_blocks_suit_the_slowest_residual_and_the_shortest_data(monkeypatch: pyt
         late=lambda: (0.0, 0.0),
         shifted=lambda: np.zeros(1),
     )
-    monkeypatch.setattr(standard, "_equations", lambda *_: sums)
+    monkeypatch.setattr(standard, "_equations", lambda *_: SimpleNamespace(met=sums))
     model: Any = SimpleNamespace(arm=SimpleNamespace(n=2))
     samples: Any = SimpleNamespace(motion=motion)
     fitted: Any = [SimpleNamespace(rows=each) for each in rows]

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from armloop.data.motion import Samples
 from armloop.data.signals import smooth
+from armloop.identification.goodness.null import empirical_null
 from armloop.identification.reconstruction.data import WINDOW, Chunk, Data
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.nearest_regime import Sorter
@@ -13,6 +15,9 @@ from armloop.identification.reconstruction.shared import sliding_rows
 from armloop.identification.scoring import residual
 from armloop.identification.uncertainty import Fitted, between_logs, standard_errors
 from armloop.identification.uncertainty.blocking import independent_blocks
+from armloop.identification.uncertainty.cross_fitting import cross_fitted, training_parts
+from armloop.identification.uncertainty.standard_errors import MOST_UNKNOWNS
+from armloop.identification.uncertainty.unknowns import problems
 from armloop.model import ReconstructedModel
 
 
@@ -27,6 +32,29 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
         shared: whether its coefficients serve all joints; then the selection is of stretches of consecutive samples, for
             friction with memory, which only such coefficients stand beside, has none of the past between others.
     """
+    samples, rows = _regressed(model, data, found, shared)
+    errors = standard_errors(model, samples, rows)
+    if samples.cutoff_hz <= 0 or not errors.get("block_seconds"):
+        return errors
+    left = residual(replace(model, effects=()), samples)
+    blocks = independent_blocks(samples.motion, errors["block_seconds"])
+    return {**errors, "between_logs": between_logs(left, sliding_rows(samples), samples.motion, blocks)}
+
+
+def left_out_null(model: ReconstructedModel, data: Data, found: Found, shared: bool) -> list[dict[str, Any]]:
+    """What laws of the catalogue remove of a model's cross-fitted residual; nothing of models with too many coefficients."""
+    samples, rows = _regressed(model, data, found, shared)
+    if samples.cutoff_hz <= 0 or max(len(one.unknowns) for one in problems(model)) > MOST_UNKNOWNS:
+        return []
+    parts = training_parts(samples.motion)
+    left = cross_fitted(replace(model, effects=()), samples, rows, parts)
+    return empirical_null(model, samples, left, parts)
+
+
+def _regressed(
+    model: ReconstructedModel, data: Data, found: Found, shared: bool
+) -> tuple[Samples, list[Fitted]]:
+    """Samples that a model's coefficients are regressed on, without the torque of its effects, and the regressions' rows."""
     chunk = data.reference
     if shared and not data.in_memory:
         chunk = data.window(WINDOW)
@@ -38,12 +66,7 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
         # taken as given, like the terms: their own errors stand beside their parameters
         bare = model.predict(samples.motion) - replace(model, effects=()).predict(samples.motion)
         samples = replace(samples, tau=samples.tau - smooth(samples, bare))
-    errors = standard_errors(model, samples, fitted_rows(chunk, found, shared))
-    if samples.cutoff_hz <= 0 or not errors.get("block_seconds"):
-        return errors
-    left = residual(replace(model, effects=()), samples)
-    blocks = independent_blocks(samples.motion, errors["block_seconds"])
-    return {**errors, "between_logs": between_logs(left, sliding_rows(samples), samples.motion, blocks)}
+    return samples, fitted_rows(chunk, found, shared)
 
 
 def fitted_rows(chunk: Chunk, found: Found, shared: bool) -> list[Fitted]:

@@ -15,12 +15,11 @@ from armloop.data.signals import Conditioning
 from armloop.dynamics.physics import check_physics
 from armloop.identification.goodness import Parts, merged, parts_of, witness
 from armloop.identification.goodness.features import Scales
-from armloop.identification.goodness.null import empirical_null
 from armloop.identification.goodness.witness import MOST, Witness
 from armloop.identification.reconstruction.bandwidth import check_nyquist
-from armloop.identification.reconstruction.data import WINDOW, Chunk, Data
+from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.excitation import check_recorded, determined
-from armloop.identification.reconstruction.fitted import uncertainty
+from armloop.identification.reconstruction.fitted import left_out_null, uncertainty
 from armloop.identification.reconstruction.friction_selection import check_laws
 from armloop.identification.reconstruction.libraries import (
     Attempt,
@@ -262,21 +261,24 @@ def _finished(
         },
     )
     tally = tried.tally(found.sorter, part)
-    parts, null = [], {}
+    parts = []
     if ready.options.parts:
         progress("what a flexible regression still finds in what the model leaves")
         parts = held_out_parts(model, data, part, progress)
-        progress("what the laws of the catalogue find in it")
-        window = data.window(WINDOW)
-        null = {"null": empirical_null(model, window.samples, window.judging("all", tried.margin))}
     yardsticks = tried.yardsticks(found.sorter, Options().block_seconds)
-    model = replace(model, baseline={**tally.baseline(), **yardsticks, "joints": merged(parts), **null})
+    model = replace(model, baseline={**tally.baseline(), **yardsticks, "joints": merged(parts)})
     if found.final is not None:
         last = found.final.model(history={**model.history, **found.final.history})
         names = ("components", "friction", "effects", "history")
         model = replace(model, **{name: getattr(last, name) for name in names})
     whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
     model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
+    if ready.options.parts and method != REFERENCE:
+        progress(
+            "what the laws of the catalogue find in what each part of the data leaves of the others' model"
+        )
+        null = {"null": left_out_null(model, data, found, tried.library.shared)}
+        model = replace(model, baseline={**model.baseline, **null})
     checks = check_physics(model)
     notes += checks.faults()
     history = {**model.history, "physics": checks.to_dict(), "notes": notes}

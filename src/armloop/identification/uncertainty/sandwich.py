@@ -9,7 +9,7 @@ jackknife (:mod:`armloop.regression.clustered`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,8 @@ from armloop.util.arrays import TINY, Array, Index
 
 #: Relative ridge against columns that a block's removal leaves dependent; their errors come out huge, as they are.
 _RIDGE = 1e-10
+#: Part of what all blocks tell of a coefficient.
+_NEXT_TO_NOTHING = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +48,12 @@ class Equations:
     lag: tuple[float, float] = (0.0, 0.0)
 
     @property
+    def met(self) -> Equations:
+        """The same of those blocks alone that any samples lie in."""
+        used = self.count.any(axis=1)
+        return replace(self, jacobian=self.jacobian[used], score=self.score[used], count=self.count[used])
+
+    @property
     def blocks(self) -> int:
         """The number B of blocks."""
         return len(self.score)
@@ -62,6 +70,11 @@ class Equations:
     def step(self) -> Array:
         """(p,) Gauss-Newton step towards the root; where all columns are linear it ends there."""
         return gauss_newton_step(self.jacobian.sum(axis=0), self.score.sum(axis=0))
+
+    def step_without(self, block: int) -> Array:
+        """(p,) Gauss-Newton step of all blocks but one; what the others tell next to nothing of stays."""
+        rest = [np.delete(sums, block, axis=0).sum(axis=0) for sums in (self.jacobian, self.score)]
+        return gauss_newton_step(rest[0] + _NEXT_TO_NOTHING * self.jacobian.sum(axis=0), rest[1])
 
     def covariance(self) -> Array:
         """(p, p) covariance, blocks being independent and the errors within them anything."""

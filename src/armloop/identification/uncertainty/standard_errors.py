@@ -171,7 +171,7 @@ def covariances(
     seconds = block_length(correlation, min(covered))
     blocks = independent_blocks(samples.motion, seconds)
     every = [
-        (problem.unknowns, _equations(problem, samples, fitted, blocks, spread))
+        (problem.unknowns, _equations(problem, samples, fitted, blocks, spread).met)
         for problem in todo
         if 0 < len(problem.unknowns) <= MOST_UNKNOWNS
     ]
@@ -202,11 +202,18 @@ def gauss_newton_steps(
     model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]
 ) -> list[tuple[list[Unknown], Array]]:
     """Every problem's unknowns with the step (p,) that solves their linearised estimating equations."""
+    whole = np.zeros(samples.motion.samples, dtype=np.intp)
+    return [(unknowns, sums.step()) for unknowns, sums in by_blocks(model, samples, fitted, whole)]
+
+
+def by_blocks(
+    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted], blocks: Index
+) -> list[tuple[list[Unknown], Equations]]:
+    """Every problem's unknowns with their estimating equations by numbered blocks (N,)."""
     todo = problems(model)
     _, spread = _residuals(todo, samples, fitted)
-    whole = np.zeros(samples.motion.samples, dtype=np.intp)
     return [
-        (problem.unknowns, _equations(problem, samples, fitted, whole, spread).step())
+        (problem.unknowns, _equations(problem, samples, fitted, blocks, spread))
         for problem in todo
         if problem.unknowns
     ]
@@ -337,12 +344,9 @@ def _equations(
             jacobian[b][np.ix_(rows, columns)] += weight * X[:, own].T @ X[:, seen]
             score[b, rows] += weight * X[:, own].T @ portion.r[first:last]
             count[b, rows] += last - first
-    used = count.any(axis=1)
     joint = problem.unknowns[0].joint
     variance = np.ones(p) if problem.weighted else spread[stages, joint]
-    return Equations(
-        jacobian[used], score[used], count[used], stages, variance, rate, (float(lag[0]), float(lag[1]))
-    )
+    return Equations(jacobian, score, count, stages, variance, rate, (float(lag[0]), float(lag[1])))
 
 
 def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) -> dict[str, dict[str, float]]:
