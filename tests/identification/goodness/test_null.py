@@ -66,6 +66,7 @@ def test_what_a_law_removes_is_the_mean_square_of_what_looks_like_it() -> None:
 def test_a_law_has_the_shape_that_removes_most_of_each_stretch(monkeypatch: pytest.MonkeyPatch) -> None:
     given = samples([0.3, -0.3, 0.6, 0.2])
     kind = type(effect("stribeck_friction", 2))
+    monkeypatch.setattr(null, "hypotheses", lambda arm: [kind(2)])
     tried = list(kind(2).shapes(filtered_context(model(), given, [kind(2)])))
     whole = removed(null_of(given), "stribeck_friction", 2).sum()
     each = []
@@ -178,13 +179,16 @@ def test_columns_are_fitted_to_all_joints_at_once() -> None:
     assert null._removed(np.zeros((3, 2, 1, 1)), y, counted) == pytest.approx(0.0)
 
 
-def test_a_reconstruction_keeps_what_each_log_leaves_of_the_others_model(tmp_path: Path) -> None:
+def test_a_reconstruction_keeps_what_each_log_leaves_of_the_others_model(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Dry friction that differs from log to log, which no held-out block of a log shows."""
     arm, logs = three_axis(), []
     for seed, level in enumerate([1.0, 1.0, 1.0, 2.0], 1):
         motion = fourier_motion(12.0, 100.0, seed)
         tau = rigid_torque(arm, motion.q, motion.v, motion.vdot) + np.sign(motion.v) * [1.0, level, 1.0]
         logs.append(measured(motion, tau, seed, 0.02, name=f"run_{seed}"))
+    monkeypatch.setattr(null, "hypotheses", lambda arm: [effect("coulomb_friction", j) for j in (1, 2)])
     found = reconstruct(logs, arm, library="rigid-body", options=Options(standard_errors=False))
     found.model.save(tmp_path / "model.json")
     kept = load_model(tmp_path / "model.json").baseline["null"]
