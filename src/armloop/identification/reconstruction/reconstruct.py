@@ -274,9 +274,7 @@ def _finished(
     whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
     model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
     if ready.options.parts and method != REFERENCE:
-        progress(
-            "what the laws of the catalogue find in what each part of the data leaves of the others' model"
-        )
+        progress("what laws of the catalogue find in runs left out of the regression")
         null = {"null": left_out_null(model, data, found, tried.library.shared)}
         model = replace(model, baseline={**model.baseline, **null})
     checks = check_physics(model)
