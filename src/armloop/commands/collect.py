@@ -15,7 +15,7 @@ class Collect(Chain):
 
     arm: str = argument(
         help=f"{ARM_HELP}; friction and damping in a URDF are not used: its joints get static 0.65, Coulomb 0.5 N·m and "
-        "viscous 1 N·m·s/rad, sliding ones 6.5, 5 N and 20 N·s/m"
+        "viscous 1 N·m·s/rad, sliding ones 6.5, 5 N and 20 N·s/m, weak or light ones less, which is said"
     )
     out: str = required("folder for the logs")
     plan: str = option(

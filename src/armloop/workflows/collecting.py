@@ -32,7 +32,7 @@ def collect_logs(arm: str | Arm, plan: str, seed: int, progress: Progress) -> di
         raise ScenarioError(
             f"--plan {plan}: there is no such plan; there are: {', '.join([*plan_names(), SIMULATION])}"
         )
-    plant = plant_for(arm)
+    plant = plant_for(arm, () if plan == SIMULATION else None)  # it has no friction
     if plan == SIMULATION:
         counts = _COUNTS.get(plant.arm.n, (2000, 10000, 10000))
         return inverse_dynamics_samples(plant.arm, plant.config.ranges, counts, seed)

@@ -21,7 +21,9 @@ from armloop.experiment.excitation import fourier_reference
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor
 from armloop.util.errors import InputWarning, LogError
+from armloop.util.progress import silent
 from armloop.util.resources import urdf_path
+from armloop.workflows import collect_logs
 
 TINY = msgspec.structs.replace(
     load_plan("quick"), static_poses=4, velocity_segments=8, trajectories=1, trajectory_duration=5.0
@@ -138,7 +140,7 @@ def test_any_urdf_has_a_plant(tmp_path):
         assert_allclose(part.tau.mean(axis=0), expected.mean(axis=0), rtol=0.02, atol=0.03)
 
 
-def test_friction_of_a_urdf_that_is_not_used_is_said(tmp_path):
+def test_friction_that_nobody_stated_is_said_and_what_is_not_used(tmp_path):
     path, text = tmp_path / "own.urdf", urdf_path("three_axis").read_text()
     for dynamics, names in (
         ('<dynamics damping="0.0" friction="0.0"/>', None),
@@ -152,12 +154,15 @@ def test_friction_of_a_urdf_that_is_not_used_is_said(tmp_path):
                 friction = plant_for(arm).config.friction
             assert friction == (JointFriction(0.65, 0.5, 0.1, 1.0),) * 3
             said = [str(one.message) for one in caught if issubclass(one.category, InputWarning)]
-            assert len(said) == (names is not None)
-            assert not said or f"<dynamics> of {names} are not used" in said[0]
+            assert len(said) == 1
+            assert "friction of a usual size, Coulomb 0.5, 0.5, 0.5 N·m" in said[0]
+            assert ("not used" in said[0]) == (names is not None)
+            assert names is None or f"<dynamics> of {names} are not used" in said[0]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         own = (JointFriction(1.0, 1.0),) * 3
         assert plant_for(path, own).config.friction == own
+        collect_logs(path, "simulation", 0, silent)  # of inverse dynamics without friction: nothing to say
 
 
 def test_a_motion_of_the_designed_family_is_followed():

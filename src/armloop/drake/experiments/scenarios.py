@@ -26,6 +26,7 @@ from armloop.drake.experiments.scenario_references import (
 from armloop.drake.plant.config import Instruments, PlantConfig
 from armloop.drake.plant.fault_injection import UndeclaredEffect, realise
 from armloop.drake.plant.friction import JointFriction
+from armloop.drake.plant.usual_friction import usual_friction
 from armloop.experiment.excitation import MotionRanges, Reference
 from armloop.robot.arm import Arm, load_arm
 from armloop.robot.urdf import urdf_tree
@@ -81,19 +82,22 @@ def built_in(spec: str | Path | Arm) -> bool:
 def plant_for(spec: str | Path | Arm, friction: tuple[JointFriction, ...] | None = None) -> Plant:
     """Return the plant of an arm by its built-in name, of any URDF by its path, or of an arm that is loaded.
 
-    The joints of a URDF get the friction given, else f_s 0.65, f_c 0.5, f_v 1 N*m (5, 6.5 N, 20 N*s/m for prismatic ones),
-    and the ranges that its limits allow. Damping and friction of its `<dynamics>` are not used, which is said where
-    they are above zero: most URDFs have dummies there, and none has what sticks.
+    The joints of a URDF get the friction given, else that of `usual_friction`, which is said, and the ranges that its
+    limits allow. Damping and friction of its `<dynamics>` are not used, which is said where they are above zero: most
+    URDFs have dummies there, and none has what sticks.
     """
     if built_in(spec):
         return load_plant(spec.name if isinstance(spec, Arm) else str(spec))
     arm = spec if isinstance(spec, Arm) else load_arm(spec)
-    return Plant(arm.name, arm, PlantConfig(friction or _usual_friction(arm), MotionRanges.of(arm)))
+    return Plant(
+        arm.name,
+        arm,
+        PlantConfig(_unstated_friction(arm) if friction is None else friction, MotionRanges.of(arm)),
+    )
 
 
-def _usual_friction(arm: Arm) -> tuple[JointFriction, ...]:
-    """Friction of a usual size for joints of which none is stated; says where it takes the place of a URDF's."""
-    turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
+def _unstated_friction(arm: Arm) -> tuple[JointFriction, ...]:
+    """Friction of a usual size for joints of which none is stated; says so, and where a URDF's is not used."""
     joints = urdf_tree(arm.urdf).iter("joint") if arm.urdf else ()
     stated = {
         joint.get("name")
@@ -102,12 +106,19 @@ def _usual_friction(arm: Arm) -> tuple[JointFriction, ...]:
         if any(float(dynamics.get(key) or 0.0) > 0 for key in ("damping", "friction"))
     }
     unused = [name for name in arm.joint_names if name in stated]
-    if unused:
-        warn(
-            f"{arm.name}: damping and friction in the URDF's <dynamics> of {', '.join(unused)} are not used: the simulated "
-            "joints have friction of a usual size; state theirs as `friction` of a scenario's own_plant"
-        )
-    return tuple(turning if turns else sliding for turns in arm.revolute)
+    instead = (
+        f", for damping and friction in the URDF's <dynamics> of {', '.join(unused)} are not used"
+        if unused
+        else ""
+    )
+    friction = usual_friction(arm)
+    levels = ", ".join(f"{f.coulomb:.3g}" for f in friction)
+    warn(
+        f"{arm.name}: the simulated joints have friction of a usual size, Coulomb {levels} "
+        f"{' / '.join(dict.fromkeys(arm.torque_units)).replace('*', '·')}{instead}; state theirs as `friction` of a "
+        "scenario's own_plant"
+    )
+    return friction
 
 
 def plan_names() -> list[str]:
@@ -268,7 +279,7 @@ def _plant(name: str, data: PlantData, where: str, loaded: Arm | None = None) ->
         raise ScenarioError(f"{where}: arm: {error}") from error
     if len(data.friction) not in (0, arm.n):
         raise ScenarioError(f"{where}: friction has {len(data.friction)} joints; {arm.name} has {arm.n}")
-    friction = [] if data.friction else list(_usual_friction(arm))
+    friction = [] if data.friction else list(_unstated_friction(arm))
     for j, values in enumerate(data.friction):
         try:
             friction.append(JointFriction(**asdict(values)))
