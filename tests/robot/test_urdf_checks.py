@@ -53,7 +53,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "a negative mass": (GOOD.replace('value="2.0"', 'value="-1"'), r"link 'base': <mass> value=-1 must be from 0"),
     "NaN mass": (GOOD.replace('value="2.0"', 'value="nan"'), r"<mass> value='nan' is not a finite number"),
     "no mass": (GOOD.replace('<mass value="2.0"/>', ""), r"link 'base': <inertial> has no <mass>"),
-    "no inertia": (link("base").split("<inertia ")[0] + "</inertial></link>" + "".join(PARTS[1:5]), r"has no <inertia>"),
+    "no inertia": ("".join(PARTS[:4]) + link("l2").split("<inertia ")[0] + "</inertial></link>", r"'l2': .* no <inertia>"),
     "part of an inertia": (GOOD.replace('ixx="0.03" ', ""), r"link 'base': <inertia> has no ixx"),
     "text for an inertia": (GOOD.replace('ixx="0.03"', 'ixx="big"'), r"<inertia> ixx='big' is not a finite"),
     "a negative inertia": (GOOD.replace('ixx="0.03"', 'ixx="-0.03"'), r"not positive definite: .*-0.03"),
@@ -183,6 +183,10 @@ AS_PUBLISHED = {
         r"'base': <inertia> is zero with a mass", (-2, 2, 3)
     ),
     "a base that no body is": (GOOD.replace('ixy="0"', 'ixy="0.2"', 1), r"'base': .*but this link never moves", (-2, 2, 3)),
+    "a base of a mass alone": (
+        link("base").split("<inertia ")[0] + "</inertial></link>" + "".join(PARTS[1:5]),
+        r"'base': <inertial> has no <inertia>, but this link never moves", (-2, 2, 3)
+    ),
     "a fixed joint that mimics": (
         GOOD + joint("f", "l2", "f", "fixed", '<mimic joint="j1"/>') + link("f", 0.1), None, (-2, 2, 3)
     ),

@@ -150,15 +150,15 @@ def _names(root: Element, kind: str, path: Path) -> list[str]:
 def as_of_a_body(link: Element) -> None:
     """Change a checked link's <inertial> to the nearest that a body has, in place; most have one.
 
-    Without mass there is no inertia, and no principal moment is above the sum of the others: Drake would put a ball of
-    water in the place of what misses this by the rounding of its digits alone.
+    Without mass there is no inertia, a link that never moves needs none, and no principal moment is above the sum of the
+    others: Drake would put a ball of water in the place of what misses this by the rounding of its digits alone.
     """
     inertial = link.find("inertial")
     if inertial is None:
         return
     mass, tensor = inertial.find("mass"), inertial.find("inertia")
-    assert mass is not None and tensor is not None
-    if float(mass.get("value", "0")) == 0:
+    assert mass is not None
+    if float(mass.get("value", "0")) == 0 or tensor is None:
         link.remove(inertial)
         return
     xx, xy, xz, yy, yz, zz = (float(tensor.get(key, "0")) for key in _TENSOR)

@@ -54,9 +54,11 @@ def check_link(link: Element, where: str, moves: bool = True) -> None:
         raise ArmError(f"{where}: <mass> value={mass:g} must be from 0 to {HEAVIEST:g}; give kg")
     element = inertial.find("inertia")
     if element is None:
-        raise ArmError(
-            f"{where}: <inertial> has no <inertia>; give ixx, iyy, izz (and ixy, ixz, iyz) in kg·m²"
-        )
+        wrong = f"{where}: <inertial> has no <inertia>"
+        if moves:
+            raise ArmError(f"{wrong}; give ixx, iyy, izz (and ixy, ixz, iyz) in kg·m²")
+        warn(f"{wrong}, but this link never moves")
+        return
     diagonal = [number(element, key, f"{where}: <inertia>") for key in ("ixx", "iyy", "izz")]
     ixy, ixz, iyz = (
         number(element, key, f"{where}: <inertia>") if key in element.attrib else 0.0
