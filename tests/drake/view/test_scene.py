@@ -94,7 +94,8 @@ def test_the_camera_goes_back_for_more_arms(count: int, distance: float) -> None
     np.testing.assert_allclose(camera - target, distance * np.array([0.86, -0.36, 0.36]))
 
 
-def test_an_arm_with_shapes_of_its_own_keeps_them_in_its_colour() -> None:
+@pytest.mark.parametrize("base", ["foot", "world", "an undeclared world"])
+def test_an_arm_with_shapes_of_its_own_keeps_them_in_its_colour(base: str) -> None:
     urdf = """<robot name="one"><material name="m"><color rgba="1 1 1 1"/></material>
       <link name="foot"/><link name="rod"><inertial><mass value="1"/>
       <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
@@ -102,6 +103,9 @@ def test_an_arm_with_shapes_of_its_own_keeps_them_in_its_colour() -> None:
       <material name="m"><color rgba="1 1 1 1"/></material></visual>
       </link><joint name="j" type="revolute"><parent link="foot"/><child link="rod"/><origin xyz="0 0 1"/><axis xyz="0 0 1"/>
       <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+    if "undeclared" in base:
+        urdf = urdf.replace('<link name="foot"/>', "")
+    urdf = urdf.replace('"foot"', f'"{base.split()[-1]}"')
     arm = replace(sticks(), urdf=urdf)
     builder = DiagramBuilder()
     plant, graph = AddMultibodyPlantSceneGraph(builder, 0.0)

@@ -17,7 +17,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from armloop.drake.plant.plant import add_links
 from armloop.robot.arm import Arm
-from armloop.robot.urdf import urdf_tree
+from armloop.robot.urdf import base_links, urdf_tree
 from armloop.util.quiet import quiet
 
 COLOURS = (
@@ -97,15 +97,29 @@ def _add_arm(
         # A name of its own: materials of one name must agree over all arms.
         material.set("name", f"{label}_{material.get('name', '')}")
         ElementTree.SubElement(material, "color", rgba=rgba)
-    links = {link.get("name", "") for link in root.findall("link")}
-    children = {child.get("link", "") for child in root.findall("joint/child")}
+    base = _own_base(root)
     with quiet("drake"):  # what there is to warn of was said when the arm was loaded
         (instance,) = Parser(plant).AddModelsFromString(
             ElementTree.tostring(root, encoding="unicode"), "urdf"
         )
-    (base,) = links - children
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, instance), X_WB)
     return instance
+
+
+def _own_base(root: ElementTree.Element) -> str:
+    """Return the name of the base link; one called `world`, declared or not, is Drake's world: it gets another, in place."""
+    (base,) = base_links(root)
+    if base != "world":
+        return base
+    names = [link.get("name", "") for link in root.findall("link")]
+    new = "world_" + max(names, key=len)  # longer than any
+    if "world" not in names:
+        ElementTree.SubElement(root, "link", name=new)
+    for link in root.findall("link[@name='world']"):
+        link.set("name", new)
+    for parent in root.findall("joint/parent[@link='world']"):
+        parent.set("link", new)
+    return new
 
 
 def _add_sticks(
