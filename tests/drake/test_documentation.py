@@ -2,6 +2,7 @@
 
 import inspect
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,8 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 import armloop.drake as room
 from armloop.commands.collect import Collect
-from armloop.drake.experiments.scenarios import plant_for
-from armloop.util.resources import urdf_path
+from armloop.drake.plant.usual_friction import usual_friction
+from armloop.robot.arm import load_arm
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "drake.md"
 SYSTEMS = {
@@ -57,8 +58,11 @@ def test_what_the_page_shows_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_the_help_says_which_friction_a_urdfs_joints_get() -> None:
-    plant = plant_for(urdf_path("scara"))
-    kinds = dict(zip(plant.arm.revolute.tolist(), plant.config.friction, strict=True))
+    arm = load_arm("scara")
+    strong = replace(
+        arm, mass=10 * arm.mass, joints=tuple(replace(joint, effort=1e3) for joint in arm.joints)
+    )
+    kinds = dict(zip(arm.revolute.tolist(), usual_friction(strong), strict=True))
     said = vars(Collect)["arm"].more["help"]
     for friction, text in (
         (kinds[True], "static {}, Coulomb {} N·m and viscous {} N"),

@@ -42,8 +42,11 @@ from armloop.drake import (
     presliding_of,
 )
 from armloop.drake.experiments.scenarios import load_plant
+from armloop.dynamics import nearest_rigid_body
 from armloop.experiment.excitation import TableReference, paper_reference
+from armloop.features.rigid_body import BaseParameters
 from armloop.model import ReconstructedModel, load_model
+from armloop.model.components import RigidBody
 from armloop.util.errors import InputError
 
 NAN, INF = float("nan"), float("inf")
@@ -60,6 +63,16 @@ def added(
 
 def under(law: Any, plant: Any = None) -> Any:
     return add_arm_under(DiagramBuilder(), load_plant("three_axis") if plant is None else plant, law, MOTION)
+
+
+def turned(model: ReconstructedModel) -> ReconstructedModel:
+    """The model with the sign of its first link's inertia about the joint's axis turned."""
+    (body,) = nearest_rigid_body(model).components
+    assert isinstance(body, RigidBody)
+    parameters = body.parameters.copy()
+    parameters[4:7] -= 10.0
+    base = BaseParameters.of_arm(model.arm, rotors=True)
+    return replace(model, components=(RigidBody(parameters, tuple(base.names), base.from_full(parameters)),))
 
 
 class OfTwo:
@@ -115,6 +128,18 @@ WRONG: dict[str, tuple[Make, str]] = {
     "an integral that is never summed": (
         lambda m: ComputedTorque(m, AccelerationGains([1] * 3, [1] * 3, [1] * 3), period=-1e-3),
         "period must be a number above 0",
+    ),
+    "inertia of the wrong sign": (
+        lambda m: ComputedTorque(turned(m), SOFT),
+        "computed torque would drive .* definite",
+    ),
+    "inertia of the wrong sign, later": (
+        lambda m: ComputedTorque(m, SOFT).set_model(turned(m)),
+        "would drive the arm away.*smallest eigenvalue is -.*with_mass_matrix",
+    ),
+    "inertia of the wrong sign, in a diagram": (
+        lambda m: added(turned(m), SOFT, controller="computed_torque"),
+        "computed torque would drive the arm away",
     ),
     "friction at a list": (lambda m: ComputedTorque(m, SOFT, friction_at=["state"]), "friction_at is"),
     "dynamics of a path": (lambda m: ForwardDynamics("model.json"), "the model must be a ReconstructedModel"),

@@ -13,11 +13,11 @@ from armloop.drake.control.pid import check_gains
 from armloop.drake.given import require_joints, require_model, require_of, require_predicts
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector
-from armloop.dynamics import ModelEquations
+from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.model import ReconstructedModel
 from armloop.model.pointwise import InverseDynamics
 from armloop.util.arrays import Array
-from armloop.util.errors import InputError
+from armloop.util.errors import InputError, ModelError
 from armloop.util.given import require
 
 FRICTION_SOURCES = ("reference", "state", "none")
@@ -82,8 +82,9 @@ def ComputedTorque_(T: type) -> Any:
         (forward Euler), or continuous without one. Direct feedthrough of all inputs. Scalar types float,
         AutoDiffXd and Expression; for the last two the model must be a `ReconstructedModel`.
 
-        Precondition: M is positive definite. It is not checked, as any model will do that predicts; a joint whose
-        inertia sparse terms lack gets no feedback. `armloop.dynamics.with_mass_matrix(model)` sees to it.
+        Precondition: M is positive definite; where it is not, feedback drives errors away. A `ReconstructedModel` without
+        such an M over its training range is refused, `ModelError`, by `set_model`, too: hand in
+        `armloop.dynamics.with_mass_matrix(model)`. Of anything else that predicts it is not checked.
 
         Not supported: torque limits (saturate `tau` behind it), friction with memory (taken as fully slid),
         models of a step below 3, which hold no inertia. A torque that is not finite raises `RuntimeError`.
@@ -129,6 +130,8 @@ def ComputedTorque_(T: type) -> Any:
             self.DeclareVectorOutputPort("tau", n, self._calc_tau, sources)
 
         def _take(self, model: InverseDynamicsModel) -> None:
+            if isinstance(model, ReconstructedModel):
+                _require_feedback(model)
             if T is float:
                 self._drive = _drive(model)
             else:
@@ -185,6 +188,17 @@ def ComputedTorque_(T: type) -> Any:
 
 
 ComputedTorque = ComputedTorque_[None]
+
+
+def _require_feedback(model: ReconstructedModel) -> None:
+    """Raise `ModelError` for a model whose M turns an acceleration wanted into a torque the other way."""
+    try:
+        require_mass_matrix(model)
+    except ModelError as error:
+        raise ModelError(
+            f"computed torque would drive the arm away from its reference: {error}. "
+            "armloop.dynamics.with_mass_matrix(model) takes the nearest rigid body where it has one"
+        ) from error
 
 
 def _drive(model: InverseDynamicsModel) -> InverseDynamics:
