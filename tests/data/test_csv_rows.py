@@ -18,6 +18,8 @@ TEXTS = {
     "plain": "\n".join(["a,b", *ROWS]) + "\n",
     "no line feed at the end": "\n".join(["a,b", *ROWS]),
     "of Windows": "\r\n".join(["a,b", *ROWS]) + "\r\n",
+    "carriage returns alone": "\r".join(["a,b", *ROWS]) + "\r",
+    "ends of each kind": "a,b\r" + "\r\n".join(ROWS[:9]) + "\n\r\r" + "\r".join(ROWS[9:]) + "\n",
     "blank lines": "\n\na,b\n\n" + "\r\n\r\n\n".join(ROWS) + "\n\n\r\n",
     "notes of two lines": '"a\nc",b\n' + "\n".join(f'{k},"no\n\nte ""{k}"""' for k in range(23)) + "\n",
     "byte order mark": "\ufeffa,b\n" + "\n".join(ROWS),

@@ -1,7 +1,8 @@
 """Byte offsets of a CSV's rows: a sparse index, by which some rows are read without those before them.
 
-A row ends at a line feed that stands in no quotes; lines without a character are no rows, as for pyarrow. One pass over
-the bytes finds every so manyth, faster than any cell could be read.
+A row ends at a line feed or a carriage return that stands in no quotes; lines without a character are no rows, as for
+pyarrow, and so a pair of the two ends one row. One pass over the bytes finds every so manyth, faster than any cell
+could be read.
 """
 
 from __future__ import annotations
@@ -48,29 +49,27 @@ def index_rows(path: Path) -> RowIndex:
 def _index(path: Path, size: int, changed: int) -> RowIndex:
     """The index of a file of this size, last changed at this instant, ns."""
     starts: list[NDArray[np.int64]] = []
-    # The header has the number -1. The present line begins at byte ``begin``; ``last`` is the byte before the block.
-    following, begin, done, last, quoted = -1, 0, 0, _LINE_FEED, False
+    # The header has the number -1. The present line begins at byte ``begin``.
+    following, begin, done, quoted = -1, 0, 0, False
     with path.open("rb") as file:
         while block := file.read(_BLOCK):
             cells = np.frombuffer(block, dtype=np.uint8)
             ends, quoted = _ends(cells, quoted)
             begins = np.concatenate([[begin], done + ends + 1])
-            before = np.concatenate([[last], cells[:-1]])[ends]
-            length = done + ends - begins[:-1] - (before == _RETURN)
-            rows = begins[:-1][length > 0]
+            rows = begins[:-1][done + ends > begins[:-1]]
             numbers = following + np.arange(len(rows))
             starts.append(rows[(numbers >= 0) & (numbers % STEP == 0)])
             following, begin = following + len(rows), int(begins[-1])
-            done, last = done + len(block), block[-1]
-    if done > begin:  # the last line needs no line feed
+            done += len(block)
+    if done > begin:  # the last line needs no end
         starts.append(np.array([begin] if following >= 0 and following % STEP == 0 else [], dtype=np.int64))
         following += 1
     return RowIndex(max(0, following), np.concatenate([*starts, [done]]).astype(np.int64))
 
 
 def _ends(cells: NDArray[np.uint8], quoted: bool) -> tuple[NDArray[np.int64], bool]:
-    """Places of the line feeds outside quotes, and whether the block ends within quotes, as it may begin."""
-    ends = np.flatnonzero(cells == _LINE_FEED)
+    """Places of the line ends outside quotes, and whether the block ends within quotes, as it may begin."""
+    ends = np.flatnonzero((cells == _LINE_FEED) | (cells == _RETURN))
     quotes = np.flatnonzero(cells == _QUOTE)
     outside = (np.searchsorted(quotes, ends) + quoted) % 2 == 0
     return ends[outside], bool((len(quotes) + quoted) % 2)
