@@ -47,10 +47,12 @@ def test_a_row_without_its_entries_is_named(tmp_path, log, fault):
         convert([folder], answers=ASKED)
 
 
-def test_an_effort_of_no_position_asks_for_a_map(tmp_path, log):
-    names = {"state": JOINTS, "velocity": JOINTS, "effort": ["shoulder", "elbow", "lift"]}
+@pytest.mark.parametrize("efforts", [["shoulder", "elbow", "lift"], ["motor_3", "motor_2", "motor_1"]])
+def test_an_effort_of_no_position_asks_for_a_map(tmp_path, log, efforts):
+    names = {"state": JOINTS, "velocity": JOINTS, "effort": efforts}
     folder = data_set(tmp_path / "set", log, names)
-    with pytest.raises(InputError, match=r"observation.effort/lift belong to no position by name, .*--map"):
+    said = rf"observation.effort/{efforts[-1]} belong to no position by name, .*--map"
+    with pytest.raises(InputError, match=said):
         convert([folder], answers=ASKED)
     columns = {kind: [f"observation.{kind}/{name}" for name in entries] for kind, entries in names.items()}
     mapping = Mapping(
@@ -62,8 +64,9 @@ def test_an_effort_of_no_position_asks_for_a_map(tmp_path, log):
     assert_same(convert([folder], mapping=mapping).log, log)
 
 
-def test_velocities_of_other_joints_are_not_taken(tmp_path, log):
-    names = {"state": JOINTS, "effort": JOINTS, "velocity": ["elbow", "waist", "lift"]}
+@pytest.mark.parametrize("velocities", [["elbow", "waist", "lift"], ["a", "b", "c"]])
+def test_velocities_of_other_joints_are_not_taken(tmp_path, log, velocities):
+    names = {"state": JOINTS, "effort": JOINTS, "velocity": velocities}
     found = convert([data_set(tmp_path / "set", log, names)], answers=ASKED)
     assert any("central differences" in note for note in found.notes)
     np.testing.assert_allclose(found.log.v, log.v, atol=0.05)

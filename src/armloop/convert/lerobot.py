@@ -110,14 +110,10 @@ def _mapping(columns: dict[str, Array], fps: float | None) -> Mapping | str:
     velocities = next((found for stem in _VELOCITIES if (found := _of(columns, stem))), by_ending["v"])
     positions = by_ending["q"] or [name for name in states if name not in (*torques, *velocities)]
     held = {_stem(name) for name in positions}
-    if (
-        strange := [name for name in torques if _stem(name) not in held]
-        if held & {*map(_stem, torques)}
-        else []
-    ):
-        return (
-            f"{', '.join(strange)} belong to no position by name, as the others do ({', '.join(positions)})"
-        )
+    # what has no name is taken in its order; a name that is no position's may be any joint's
+    called = [name for name in torques if "/" in name] if any("/" in name for name in positions) else []
+    if strange := [name for name in called if _stem(name) not in held]:
+        return f"{', '.join(strange)} belong to no position by name, of {', '.join(positions)}"
     positions, torques, velocities = _paired(positions, torques, velocities)
     if not positions or len(torques) != len(positions):
         guess = suggest(list(columns)).mapping
@@ -143,7 +139,7 @@ def _paired(q: list[str], tau: list[str], v: list[str]) -> tuple[list[str], list
     if not common:
         return q, tau, v
     found = [[names[joint] for joint in common if joint in names] for names in by_joint]
-    return found[0], found[1], found[2] or v
+    return found[0], found[1], found[2] or [name for name in v if "/" not in name]
 
 
 def _of(columns: dict[str, Array], stem: str) -> list[str]:
