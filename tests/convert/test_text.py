@@ -108,6 +108,31 @@ def test_dates_and_times_of_day_are_a_clock(tmp_path, log, rows, form, begin):
     np.testing.assert_allclose(found.log.time, log.time, atol=1e-6)
 
 
+@pytest.mark.parametrize("form", ["%H:%M:%S.%f", "%d.%m.%Y %H:%M:%S.%f", "%Y-%m-%d %H:%M:%S.%f"])
+@pytest.mark.parametrize("hour", [1, -1], ids=["forward", "back"])
+def test_a_clock_that_is_put_to_summer_time_or_back_goes_on(tmp_path, log, rows, form, hour):
+    micro = np.round(1e6 * log.time).astype("timedelta64[us]")
+    micro[250:] += np.timedelta64(hour, "h")
+    stamps = [at.strftime(form) for at in (np.datetime64("2024-03-31T01:59:57") + micro).tolist()]
+    stamped = [[stamp, *row[1:]] for stamp, row in zip(stamps, rows, strict=True)]
+    path = write(tmp_path / "log.csv", stamped, ["timestamp", *NAMES[1:]], ";")
+    found = convert([path], answers=ASKED)
+    np.testing.assert_allclose(found.log.time, log.time, atol=1e-6)
+    way = "forward" if hour > 0 else "back"
+    assert any(f"an hour taken out where the clock was put {way} at row 251" in note for note in found.notes)
+
+
+def test_an_hour_of_pause_between_instants_stays_one(tmp_path, log, rows):
+    micro = np.round(1e6 * log.time).astype("timedelta64[us]")
+    micro[250:] += np.timedelta64(1, "h")
+    stamped = [
+        [f"{at}Z", *row[1:]] for at, row in zip(np.datetime64("2024-03-31T01:00") + micro, rows, strict=True)
+    ]
+    path = write(tmp_path / "log.csv", stamped, ["timestamp", *NAMES[1:]])
+    found = convert([path], answers=ASKED)
+    assert len(found.log.runs()) == 2 and np.ptp(found.log.time) > 3600
+
+
 @pytest.mark.parametrize("stem", ["header.stamp.", "stamp_", ""])
 @pytest.mark.parametrize("ends", [("sec", "nanosec"), ("secs", "nsecs")])
 def test_stamps_in_two_columns_are_one_clock(tmp_path, log, rows, stem, ends):

@@ -78,8 +78,9 @@ def _parquet(path: Path) -> TextTable:
         kind = table.schema.field(name).type
         if is_number(kind) or pyarrow.types.is_boolean(kind):
             made.columns[name] = numbers_of(table.column(name))
-        elif (seconds := clock_seconds(table.column(name))) is not None:
-            made.columns[name], made.units[name] = seconds, "s"
+        elif (clock := clock_seconds(table.column(name))) is not None:
+            made.columns[name], made.units[name] = clock[0], "s"
+            made.notes.append(f"{name}: {clock[1]}")
         else:
             made.dropped.append(f"{name} ({kind})")
     return made

@@ -144,9 +144,9 @@ def read_text(path: Path) -> TextTable:
                 twice.append(name)
         elif is_number(kind) or pyarrow.types.is_boolean(kind):
             columns[name] = numbers_of(cells)
-        elif (seconds := clock_seconds(cells)) is not None:
-            columns[name], units[name] = seconds, "s"
-            notes.append(f"{name}: dates or times of day, counted in s from the first row")
+        elif (clock := clock_seconds(cells)) is not None:
+            columns[name], units[name] = clock[0], "s"
+            notes.append(f"{name}: {clock[1]}")
         elif pyarrow.types.is_string(kind):
             # A cell that is no number among numbers is a fault only where the column is needed.
             texts = cells.to_pylist()
