@@ -183,6 +183,13 @@ def test_times_that_are_no_seconds_are_refused_where_no_v_tells(
         read_log(path)
 
 
+@pytest.mark.parametrize("ticks", [1e3, 1e9])
+def test_times_that_are_no_seconds_are_named_before_the_rates_that_they_put_off(ticks: float) -> None:
+    log = good()
+    with pytest.raises(LogError, match="column time has .*, as if it were in"):
+        MotionLog(ticks * log.time, log.q, log.v, log.tau)
+
+
 def test_independent_samples_are_no_motion_and_pass() -> None:
     rng = np.random.default_rng(0)
     q, v = rng.uniform(-2, 2, (400, 3)), rng.uniform(-1, 1, (400, 3))

@@ -54,7 +54,7 @@ def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str,
 def _contradiction(recording: Recording, mapping: Mapping, v: QuantityMap) -> dict[str, str]:
     """What is wrong where v is not the rate of q in the units that the source says; nothing where that is not known."""
     clock, unit = mapping.time.column, canonical(mapping.time.unit or "", "time")
-    if clock is None or unit is None or recording.kind == "motion log":
+    if clock is None or unit is None:
         return {}
     ratio = rate_ratio(recording.columns[clock], recording, mapping.q, v) / FACTORS["time"][unit]
     if ratio == 0 or 0.7 < ratio < 1.4:

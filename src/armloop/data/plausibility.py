@@ -48,11 +48,10 @@ def faults(log: Recorded) -> Iterator[Finding]:
     yield from _degrees(log)
     if not is_time_series(log.q, log.runs):
         return  # independent samples of an inverse dynamics: no rates to compare
+    yield from _clock(log)  # before the rates that it would put off
     windows = None if log.derived else windows_of(log)
     if windows is not None:
         yield from scale(windows)
-    yield from _clock(log)
-    if windows is not None:
         yield from dead_columns(log, windows)
         yield from frozen(log, windows.path)
     yield from _jumps(log)
