@@ -186,7 +186,7 @@ def test_times_that_are_no_seconds_are_refused_where_no_v_tells(
 @pytest.mark.parametrize("ticks", [1e3, 1e9])
 def test_times_that_are_no_seconds_are_named_before_the_rates_that_they_put_off(ticks: float) -> None:
     log = good()
-    with pytest.raises(LogError, match="column time has .*, as if it were in"):
+    with pytest.raises(LogError, match=r"column time has .*, as if it were in"):
         MotionLog(ticks * log.time, log.q, log.v, log.tau)
 
 
