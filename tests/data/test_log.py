@@ -165,7 +165,7 @@ FAULTS: dict[str, tuple[Callable[[Rows], object], str]] = {
     "all in degrees": (scale(range(1, 5), 57.3), r"columns q1, v1 reach .* convert degrees"),
     "positions in degrees": (scale(range(1, 3), 57.3), r"column v1 is .* as if q were in degrees"),
     "velocities in degrees": (scale(range(3, 5), 57.3), r"column v1 is .* as if v were in deg/s"),
-    "time in milliseconds": (scale(range(1), 1e3), r"column v1 is .* as if time were in milliseconds"),
+    "time in milliseconds": (scale(range(1), 1e3), r"column time has .* as if it were in milliseconds"),
     "positions in millimetres": (scale(range(2, 3), 1e3), r"column v2 is .* as if q were in mm"),
     "velocity of the wrong sign": (scale(range(4, 5), -1.0), r"column v2 is -1 times .* the opposite sign"),
     "velocity of the motor": (scale(range(4, 5), 101.0), r"column v2 is 101 times the rate of q2"),

@@ -91,6 +91,16 @@ def test_of_fewer_than_three_stretches_or_instants_out_of_time_nothing_is_known(
     assert null_of(replace(samples([0.3] * 4), cutoff_hz=0.0)) == []
 
 
+def test_a_run_within_the_filters_reach_of_its_ends_tells_nothing() -> None:
+    given = samples([0.3] * 4)
+    short = np.searchsorted(given.motion.time[:1000], 0.1)
+    rows = np.concatenate([np.arange(short), np.arange(given.motion.starts[1], given.motion.samples)])
+    starts = np.concatenate([[0], given.motion.starts[1:] - given.motion.starts[1] + short])
+    motion = given.motion.take(rows, starts)
+    found = null_of(replace(given, motion=motion, tau=given.tau[rows], moving=given.moving[rows], spans=None))
+    assert {law["stretches"] for law in found} == {3}
+
+
 def test_of_a_joint_that_moves_in_too_few_stretches_nothing_is_known() -> None:
     given = samples([0.3] * 4)
     moving = given.moving.copy()

@@ -114,7 +114,7 @@ def test_of_streamed_logs_one_piece_lies_in_memory_at_a_time(
 
     monkeypatch.setattr(conditioned, "chunk", counted)
     # Not by their names alone, one of which is a function's, too.
-    for user in ("fitted", "training", "reconstruct"):
+    for user in ("fitted", "training"):
         monkeypatch.setattr(sys.modules[f"{room}.{user}"], "WINDOW", 600)
     monkeypatch.setattr(sys.modules[f"{room}.reconstruct"], "_RIPPLE", 600)
     half = logs[0].samples // 2

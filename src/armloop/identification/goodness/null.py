@@ -52,7 +52,10 @@ def empirical_null(
     samples, rows = _around(samples, asked >= 0)
     asked, left, parts = asked[rows], left[rows], parts[rows]
     told = independent_rows(samples) & ~samples.at_an_end
-    stretches = [np.flatnonzero(told & (asked == k)) for k in np.unique(asked[asked >= 0])]
+    # a run may be so short that the filter leaves nothing of it that is not its end's
+    stretches = [
+        rows for k in np.unique(asked) if k >= 0 and len(rows := np.flatnonzero(told & (asked == k)))
+    ]
     effects = hypotheses(model.arm)
     context = filtered_context(model, samples, effects)
     counted = samples.moving & (told & (asked >= 0))[:, None]
