@@ -101,6 +101,11 @@ def test_a_run_within_the_filters_reach_of_its_ends_tells_nothing() -> None:
     assert {law["stretches"] for law in found} == {3}
 
 
+def test_stretches_of_one_part_are_one_witness() -> None:
+    assert {law["stretches"] for law in null_of(samples([0.3, -0.3, 0.6], 20.0))} == {3}
+    assert null_of(samples([0.3, -0.3], 20.0)) == []
+
+
 def test_of_a_joint_that_moves_in_too_few_stretches_nothing_is_known() -> None:
     given = samples([0.3] * 4)
     moving = given.moving.copy()
