@@ -120,10 +120,28 @@ def test_of_events_that_are_one_for_most_of_the_shorter_the_larger_is_listed(
     events: list[tuple[int, int, float]], kept: list[int]
 ) -> None:
     found: Any = [
-        SimpleNamespace(added=event(0.1 * first - 0.05, 0.1 * end - 0.05), share=share)
+        SimpleNamespace(
+            added=event(0.1 * first - 0.05, 0.1 * end - 0.05), share=share, shown=frozenset({0, 1})
+        )
         for first, end, share in events
     ]
     assert [found.index(one) for one in contacts._distinct(motion((100,)), found)] == kept
+
+
+def test_torques_on_two_joints_that_account_for_one_burst_are_two_events() -> None:
+    given = motion((100,))
+
+    def torque(joint: int, start: float, end: float, *shown: int) -> Any:
+        added = AddedEffect(effect("external_torque", joint), event(start, end).parameters)
+        return SimpleNamespace(added=added, share=0.5, shown=frozenset(shown))
+
+    both = [torque(1, 1.0, 2.0, 0, 1), torque(2, 1.2, 2.0, 0, 1)]
+    assert len(contacts._distinct(given, both)) == 2
+    assert len(contacts._distinct(given, [both[0], torque(1, 1.2, 2.0, 0, 1)])) == 1
+    assert len(contacts._distinct(given, [both[0], torque(2, 1.2, 2.0, 1)])) == 1
+    force = torque(2, 1.2, 2.0, 0, 1)
+    force.added = AddedEffect(effect("external_contact", None), force.added.parameters)
+    assert len(contacts._distinct(given, [both[0], force])) == 1
 
 
 @pytest.mark.parametrize(
@@ -214,6 +232,7 @@ class TestFinding:
             samples=SimpleNamespace(motion=given, moving=None),
             rows=rows,
             model=SimpleNamespace(arm=three_axis(), history={}),
+            scale=np.ones(2),
         )
         monkeypatch.setattr(
             contacts, "_strays", lambda far, b: far.shape == (100, 2) and b.rows.start in of.get("strays", ())
@@ -229,11 +248,60 @@ class TestFinding:
         their friction, of joint 2 all. Beside another's burst a joint is left out.
         """
         assert self.pushed(monkeypatch, (40, 50, 0)) == [(40, 50, [0], [60, 100])]
-        assert self.pushed(monkeypatch, (40, 50, 0), (41, 50, 1)) == [(40, 50, [0, 1], [60, 100])]
+        assert self.pushed(monkeypatch, (40, 50, 0), (41, 50, 1))[:1] == [(40, 50, [0, 1], [60, 100])]
         apart = [(20, 30, [0], [60, 100]), (60, 70, [1], [0, 100])]
         assert self.pushed(monkeypatch, (20, 30, 0), (60, 70, 1)) == apart
         near = [(20, 30, [0], [60, 0]), (31, 40, [1], [0, 100])]
         assert self.pushed(monkeypatch, (20, 30, 0), (31, 40, 1)) == near
+
+    def test_one_force_or_a_torque_on_each_joint(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """On few joints torques that explain more than a force, but for what freedom explains, are what is named."""
+        asked: list[list[int]] = []
+
+        def push(rows: slice, own: list[int]) -> Any:
+            asked.append(own)
+            name, joint, share = told[tuple(own)]
+            time, inside = motion().time, np.zeros(100, dtype=bool)
+            inside[rows] = True
+            added = AddedEffect(effect(name, joint), event(time[rows.start], time[rows.stop - 1]).parameters)
+            before = np.where([0 in own, 1 in own], [3.0, 4.0], 0.0)
+            return contacts.Contact(added, inside, before, before, share, share, shown=frozenset(own))
+
+        def named(*bursts: tuple[int, int, int]) -> list[tuple[int | None, frozenset[int]]]:
+            asked.clear()
+            monkeypatch.setattr(contacts, "_with_what_is_between", lambda *_: None)
+            kept: list[Any] = []
+            distinct = contacts._distinct
+
+            def seen(given: Motion, events: list[Any]) -> list[Any]:
+                kept.extend(distinct(given, events))
+                return kept
+
+            with monkeypatch.context() as patched:
+                patched.setattr(contacts, "_distinct", seen)
+                self.pushed(patched, *bursts, push=push)
+            return [(one.added.effect.joint, one.shown) for one in kept]
+
+        pair, both = [(40, 50, 0), (41, 50, 1)], frozenset({0, 1})
+        force: tuple[str, int | None, float] = ("external_contact", None, 0.849)
+        told = {(0, 1): force, (0,): ("external_torque", 1, 0.9), (1,): ("external_torque", 2, 0.9)}
+        assert named(*pair) == [(1, both), (2, both)] and asked == [[0, 1], [0], [1]]
+        told[0, 1] = ("external_contact", None, 0.851)
+        assert named(*pair) == [(None, both)]
+        # a single torque is simpler, and one joint has but one
+        told[0, 1] = ("external_torque", 2, 0.6)
+        assert named(*pair) == [(2, both)] and asked == [[0, 1]]
+        assert named((40, 50, 0)) == [(1, frozenset({0}))] and asked == [[0]]
+        # what no torque explains at one of the joints is a force
+        told[0, 1], told[1,] = ("external_contact", None, 0.6), ("external_contact", None, 0.9)
+        assert named(*pair) == [(None, both)]
+        # what is another event's does not tell of it
+        assert self.pushed(monkeypatch, *pair)[1] == (40, 50, [0], [60, 0])
+        assert self.pushed(monkeypatch, *pair, (80, 85, 0))[1] == (40, 50, [0], [55, 0])
+        # many joints tell a force
+        told[0, 1], told[1,] = force, ("external_torque", 2, 0.9)
+        monkeypatch.setattr(contacts, "FEW", 2)
+        assert named(*pair) == [(None, both)] and asked == [[0, 1]]
 
     def test_two_that_one_explains_are_one(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Events by how many samples they hold; a third one is asked with what the first two have become."""
@@ -301,7 +369,8 @@ class TestFinding:
         bursts = (20, 31, 0), (60, 85, 1)
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, judged=once)] == [60]
         # another joint that shows it, too, moves at other times
-        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, (20, 29, 1), judged=once)] == [20, 60]
+        asked = self.pushed(monkeypatch, *bursts, (20, 29, 1), judged=once)
+        assert sorted({a for a, *_ in asked}) == [20, 60]
         # a joint that never moves is judged by all of the run
         assert len(self.pushed(monkeypatch, *bursts, judged=[False, True])) == 2
 
@@ -309,8 +378,9 @@ class TestFinding:
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         found = self.pushed(monkeypatch, judged=False)
-        assert found == [(10, 20, [0, 1], [100, 100]), (60, 70, [0, 1], [100, 100])]
-        assert self.pushed(monkeypatch, judged=False, known=11) == found[1:]
+        every = [(10, 20, [0, 1], [100, 100]), (60, 70, [0, 1], [100, 100])]
+        assert [a for a in found if len(a[2]) == 2] == every
+        assert [a for a in self.pushed(monkeypatch, judged=False, known=11) if len(a[2]) == 2] == every[1:]
         # one joint that can be judged is enough for the rest
         assert self.pushed(monkeypatch, (40, 50, 0), judged=[True, False]) == [(40, 50, [0], [60, 100])]
 

@@ -7,7 +7,7 @@ It belongs to one log and would spoil the search for what is there all the time;
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innova
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
-from armloop.diagnosis.pushes import FREEDOM, PAUSE, SHORTEST, Contact, around, push
+from armloop.diagnosis.pushes import FEW, FREEDOM, PAUSE, SHORTEST, Contact, around, push
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import TINY, Array, Index, Mask
@@ -93,12 +93,12 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
         rows[:, sorted(beyond)] = False
         return rows
 
-    contacts = []
+    contacts: list[Contact] = []
     for burst in bursts:
         left = beside(evidence.samples, residual, burst.rows) if burst.beside else residual
-        contacts.append(push(evidence, left, burst.rows, counted(burst, bursts), sorted(burst.joints)))
+        contacts += _one_or_each(evidence, left, burst, counted(burst, bursts), bursts)
     events: list[Contact] = []
-    for contact in _distinct(motion, [c for c in contacts if c and _seen_whole(motion, c)]):
+    for contact in _distinct(motion, [c for c in contacts if _seen_whole(motion, c)]):
         both = _with_what_is_between(evidence, tells | ~holds, events[-1], contact) if events else None
         if both and _rare(evidence.rows, [both]):
             beyond = [b for b in bursts if not b.joints <= both.joints]
@@ -108,6 +108,39 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
                 continue
         events.append(contact)
     return events
+
+
+def _one_or_each(
+    evidence: Evidence, residual: Array, burst: Burst, counted: Mask, bursts: Sequence[Burst]
+) -> list[Contact]:
+    """The event in a burst, or a torque on each of its joints, where these explain surely more than one force does.
+
+    On few joints a force has as much freedom as the torques, each with an interval of its own.
+
+    Args:
+        counted: (N, n) samples that tell of it.
+        bursts: all of the run.
+    """
+    joints = sorted(burst.joints)
+    one = push(evidence, residual, burst.rows, counted, joints)
+    if len(joints) < 2 or evidence.model.arm.n > FEW or (one and one.added.effect.joint is not None):
+        return [one] if one else []
+    each = []
+    for j in joints:
+        own = np.zeros_like(counted)
+        own[:, j] = counted[:, j]
+        for other in bursts:
+            if other is not burst and j in other.joints:
+                own[other.rows, j] = False
+        torque = push(evidence, residual, burst.rows, own, [j])
+        if torque is None or torque.added.effect.joint is None:
+            return [one] if one else []
+        each.append(replace(torque, shown=burst.joints))
+    if one and sum(
+        (torque.share - FREEDOM) * _energy(evidence, torque) for torque in each
+    ) <= one.share * _energy(evidence, one):
+        return [one]
+    return each
 
 
 def _with_what_is_between(evidence: Evidence, tells: Mask, first: Contact, then: Contact) -> Burst | None:
@@ -131,13 +164,14 @@ def _with_what_is_between(evidence: Evidence, tells: Mask, first: Contact, then:
 
 def _explains_both(evidence: Evidence, one: Contact, first: Contact, then: Contact) -> bool:
     """Whether one event explains as much of the residual as two in its place, but for what freedom explains."""
-
-    def energy(event: Contact) -> float:
-        return float(((event.before / evidence.scale) ** 2).sum() * np.ptp(ends(event.added.parameters)))
-
     (start, end), (_, before), (after, _) = (ends(event.added.parameters) for event in (one, first, then))
-    apart = sum((event.share - FREEDOM) * energy(event) for event in (first, then))
-    return start < before and after < end and one.share * energy(one) >= apart
+    apart = sum((event.share - FREEDOM) * _energy(evidence, event) for event in (first, then))
+    return start < before and after < end and one.share * _energy(evidence, one) >= apart
+
+
+def _energy(evidence: Evidence, event: Contact) -> float:
+    """Weighted square of what was left within an event's interval, times its length, s."""
+    return float(((event.before / evidence.scale) ** 2).sum() * np.ptp(ends(event.added.parameters)))
 
 
 def _unlike(
@@ -237,9 +271,18 @@ def _distinct(motion: Motion, contacts: list[Contact]) -> list[Contact]:
     found: list[tuple[Mask, Contact]] = []
     for contact in sorted(contacts, key=lambda contact: -contact.share):
         mine = during(motion, contact.added.values)
-        if all(2 * (mine & other).sum() <= min(mine.sum(), other.sum()) for other, _ in found):
+        if all(
+            _on_two_joints(contact, of) or 2 * (mine & other).sum() <= min(mine.sum(), other.sum())
+            for other, of in found
+        ):
             found.append((mine, contact))
     return [contact for mine, contact in sorted(found, key=lambda one: int(np.argmax(one[0])))]
+
+
+def _on_two_joints(one: Contact, other: Contact) -> bool:
+    """Whether two torques account for one burst, each on a joint of its own."""
+    joints = {one.added.effect.joint, other.added.effect.joint}
+    return one.shown == other.shown and len(joints) == 2 and None not in joints
 
 
 def _comes_back(evidence: Evidence, rows: Index, level: Array, burst: Burst) -> bool:

@@ -26,7 +26,7 @@ SHORTEST = 0.1
 #: nothing with more freedom explains so much more.
 FREEDOM = 0.05
 #: So many joints or fewer feel a force as if it were a torque on any of them.
-_FEW = 3
+FEW = 3
 #: Points at which a force may have acted lie so many links apart.
 _STEP = 0.5
 
@@ -110,7 +110,7 @@ def push(
     most = max(trial.share for trial, _ in tried)
     equals = [(trial, kind) for trial, kind in tried if trial.share >= most - FREEDOM]
     # What pushes an arm is a force far more often than a torque on one joint; two or three joints cannot tell.
-    forceful = n > _FEW
+    forceful = n > FEW
 
     def order(pair: tuple[Contact, _Kind]) -> tuple[bool, int, bool, float]:
         trial, kind = pair
