@@ -4,8 +4,8 @@ An incremental encoder counts from where the arm was put when it was switched on
 little elsewhere every time. Every log then belongs to an arm whose gravity acts at slightly other angles, which no model
 of one arm can follow. Here the zeros are regressed beside base parameters and plain friction, each with a normal prior
 whose variance, one a joint, is estimated with them (Laird and Ware, Biometrics 38(4), 1982). They are taken only where
-they predict blocks that they were not regressed on, clearly, and better than as many offsets of the torque do: an arm
-with absolute encoders keeps its own. The blocks that judge the model in the end take no part.
+they predict blocks that they were not regressed on, clearly, and as many offsets of the torque do not predict these clearly
+better: an arm with absolute encoders keeps its own. The blocks that judge the model in the end take no part.
 """
 
 from __future__ import annotations
@@ -111,8 +111,9 @@ def encoder_zeros(
         name: float(np.exp(np.mean(np.log(table.sizes(x, table.moving)[slide] / scale[slide]))))
         for name, x in left.items()
     }
-    plain, zeros, offsets = errors.values()
-    if zeros > min(_LESS * plain, offsets) or not _clearly(model, *list(left.values())[:2]):
+    plain, zeros, offsets = left.values()
+    less = errors["with zeros"] <= _LESS * errors["without"]
+    if not less or not _clearly(model, plain, zeros) or _clearly(model, zeros, offsets):
         return none
     found, spread = model.solve("zeros", np.ones(len(table.blocks), dtype=bool))[1:]
     return EncoderZeros(found, spread, errors)
