@@ -94,6 +94,29 @@ def test_an_event_of_no_more_than_what_nothing_accounts_for_at_other_times_is_dr
     assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
 
 
+def test_an_event_is_told_from_a_law_where_a_joint_leaves_twice_what_it_leaves_at_other_times() -> None:
+    """RMS, outside of all events, of which the baseline is the least; a joint that never slides obeys no law."""
+    left, rows = np.full((40, 2), 0.3), np.ones((40, 2), dtype=bool)
+    whole: Any = SimpleNamespace(rows=rows)
+    outside = rows.copy()
+    outside[:20] = False
+    left[:20] = 9.0
+    evidence: Any = SimpleNamespace(rows=outside, scale=np.array([0.1, 1.0]), residual=lambda known: left)
+
+    def told(before: float, *shown: int) -> bool:
+        contact: Any = SimpleNamespace(shown=frozenset(shown), before=np.array([before, 2.0]))
+        return contacts.told(whole, evidence, contact)
+
+    assert told(0.601, 0) and not told(0.599, 0)
+    assert told(0.0, 1) and told(0.0, 0, 1)
+    left[20:, 1] = 1.01
+    assert not told(0.0, 1)
+    outside[:, 0] = False
+    assert not told(9.0, 0)
+    rows[:, 0] = False
+    assert told(9.0, 0)
+
+
 @pytest.mark.parametrize(
     ("start", "end", "whole"),
     [(0.11, 9.79, True), (0.09, 9.79, False), (0.11, 9.81, False)],

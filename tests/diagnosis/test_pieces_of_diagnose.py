@@ -81,6 +81,10 @@ class Answers:
             "account_with_load": self.loaded,
             "outweighed": lambda *_: None,
             "drowned": lambda *_: False,
+            "told": lambda whole, evidence, contact: (
+                (whole.name, evidence.name) == ("whole", "left") and not self.given.get("untold")
+            ),
+            "event_untold": lambda event: f"not told: {event}",
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
             "strongest_first": lambda evidence, outcome: self.note("ordered", evidence.name, outcome),
             "without_law": lambda evidence, law: evidence,
@@ -170,6 +174,15 @@ def test_a_run_that_rests_is_judged_by_its_events_alone(
     assert found.reasons == ["still", "stands", "zeros of ['run']"] and found.zeros.tolist() == [[0.1] * 3]
     assert answers.asked["contacts"] == "residual of whole" and "best" not in answers.asked
     assert found.outcome.before == found.outcome.after and found.evidence.name == "left"
+
+
+def test_an_event_that_may_be_a_law_of_a_run_too_short_to_look_for_one_is_not_stated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    Answers(monkeypatch, still=True, contacts=[CONTACT], untold=True)
+    found = judged()
+    assert found.verdict == "cannot_tell" and found.contacts == [] and found.model == ("with",)
+    assert found.reasons == ["not told: push", "still", "stands", "zeros of ['run']"]
 
 
 @pytest.mark.parametrize("turned", [False, True])

@@ -376,6 +376,28 @@ def without(evidence: Evidence, contacts: list[Contact]) -> Evidence:
     return evidence.only(rows)
 
 
+def told(whole: Evidence, evidence: Evidence, contact: Contact) -> bool:
+    """Whether an event can be told from a law of the motion without a search for one.
+
+    A joint that shows it leaves a multiple of what it leaves at other times, when a law would show, too; or it does not
+    slide at all.
+
+    Args:
+        whole: the run.
+        evidence: the run without its events.
+    """
+    left, scale = (evidence.residual([]) / evidence.scale) ** 2, evidence.scale
+
+    def stands_out(j: int) -> bool:
+        rows = evidence.rows[:, j]
+        if not whole.rows[:, j].any():
+            return True
+        usual = max(float(left[rows, j].mean()), 1.0) if rows.any() else np.inf
+        return bool((contact.before[j] / scale[j]) ** 2 >= MULTIPLE**2 * usual)
+
+    return any(stands_out(j) for j in contact.shown)
+
+
 def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joints: Sequence[int]) -> bool:
     """Whether an event removes no more than is left, outside of all events, of some stretch of its run that is as long.
 

@@ -15,10 +15,10 @@ from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
 from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.carried import account_with_load
-from armloop.diagnosis.contacts import Contact, drowned, find_contacts, known_contacts, without
+from armloop.diagnosis.contacts import Contact, drowned, find_contacts, known_contacts, told, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
-from armloop.diagnosis.reasons import Standing, event_in_doubt, in_doubt, standing, too_still
+from armloop.diagnosis.reasons import Standing, event_in_doubt, event_untold, in_doubt, standing, too_still
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.score import mean_by_joint, ratio
 from armloop.diagnosis.search import (
@@ -282,6 +282,9 @@ def diagnose(
 
 def _by_events_alone(whole: Evidence, evidence: Evidence, contacts: list[Contact]) -> Diagnosis:
     """The verdict on a run in which too little moves to look for anything but events."""
+    untold = [contact for contact in contacts if not told(whole, evidence, contact)]
+    contacts = [contact for contact in contacts if contact not in untold]
+    evidence = without(whole, contacts)
     nothing = fit(evidence, evidence.residual([]), [], [])
     augmented = whole.model.with_effects([contact.added for contact in contacts])
     found = Diagnosis(
@@ -294,7 +297,8 @@ def _by_events_alone(whole: Evidence, evidence: Evidence, contacts: list[Contact
         evidence.rows,
     )
     stand = standing(evidence, augmented, found.errors()["after"], range(1, whole.model.arm.n + 1))
-    return replace(found, standing=replace(stand, reasons=[too_still(evidence), *stand.reasons]))
+    doubted = [event_untold(contact.added) for contact in untold]
+    return replace(found, standing=replace(stand, reasons=[*doubted, too_still(evidence), *stand.reasons]))
 
 
 def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnosis:

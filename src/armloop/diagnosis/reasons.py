@@ -129,6 +129,15 @@ def event_in_doubt(event: AddedEffect) -> str:
     )
 
 
+def event_untold(event: AddedEffect) -> str:
+    """A sentence on an event of a run that is too short to tell it from a law."""
+    start, end = ends(event.parameters)
+    return (
+        f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but the rest of the run is too "
+        "short, or leaves too much, to tell it from a law of the motion: it is not stated"
+    )
+
+
 def _uncounted(j: int, slides: Mask, strays: Mask, creeps: Mask) -> str:
     """Why next to nothing counts of a joint, by its samples (N,)."""
     if slides.sum() < _FEWEST:
