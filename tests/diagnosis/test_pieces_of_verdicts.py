@@ -113,9 +113,13 @@ class TestReasons:
             rows=np.ones((100, 2), dtype=bool),
             samples=SimpleNamespace(motion=given),
             blocks=np.arange(100) * blocks // 100,
-            model=SimpleNamespace(history=SimpleNamespace(get=lambda _: [[1, 1], [1, 0.2], [1, 1]])),
+            model=SimpleNamespace(
+                history=SimpleNamespace(get=lambda _: [[1, 1], [1, 0.2], [1, 1]]),
+                baseline={"joints": [{"correlation_time": 0.08}]},
+            ),
         )
         words = reasons.too_still(evidence)
+        assert not still or (f"({blocks} blocks of 0.8 s" in words and "log at least 7.2 s in which" in words)
         assert bool(words) == bool(still) and (not still or f"motion does not count: {still})" in words)
         evidence.rows[:, 0] = False
         assert "motion does not count: [1, 2]" in reasons.too_still(evidence)

@@ -99,13 +99,23 @@ def test_a_joint_creeps_below_a_hundredth_of_its_trained_speed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "length"), [(60.0, 1.5), (12.0, 1.5), (10.0, 1.25), (8.0, 1.0), (3.0, 1.0)]
+    ("seconds", "length"), [(60.0, 1.5), (12.0, 1.5), (10.0, 1.25), (8.0, 1.0), (6.0, 0.75), (3.0, 0.7)]
 )
 def test_a_short_run_is_cut_into_shorter_blocks(seconds: float, length: float) -> None:
     N = round(seconds / 2 * 100) + 1
     time = np.concatenate([np.arange(N), np.arange(N) + 10 * N]) * 0.01
     motion = Motion(time, *np.zeros((3, 2 * N, 1)), np.array([0, N]))
-    assert evidences._block_seconds(motion) == pytest.approx(length)
+    assert evidences._block_seconds(motion, 0.7) == pytest.approx(length)
+
+
+@pytest.mark.parametrize(
+    ("memories", "shortest"),
+    [([0.06, 0.08], 0.8), ([0.01, 0.02], 0.75), ([0.01, 0.3], 1.0), ([0.01, None], 1.0), ([], 1.0)],
+)
+def test_of_the_shortest_block_a_tenth_is_remembered(memories: list[float | None], shortest: float) -> None:
+    model: Any = SimpleNamespace(baseline={"joints": [{"correlation_time": each} for each in memories]})
+    assert evidences.shortest_block(model) == pytest.approx(shortest)
+    assert evidences.shortest_block(SimpleNamespace(baseline={})) == 1.0  # type: ignore[arg-type]
 
 
 def an_evidence() -> Evidence:

@@ -26,8 +26,10 @@ from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Index, Mask, stretches
 
-#: Shortest block, s, and number of folds.
-SHORTEST_BLOCK, FOLDS = 1.0, 2
+#: Number of folds.
+FOLDS = 2
+#: The shortest block, s, lies between these, so that the model's residual remembers no more than this part of it.
+_SHORTEST, _REMEMBERED = (0.75, 1.0), 0.1
 #: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
 _TRAVEL = 2e-3
 #: Below this part of its largest speed a joint may be at rest, pushed about within its friction.
@@ -98,7 +100,7 @@ class Evidence:
         scale = np.hypot(scale, np.sqrt(np.mean(between, axis=0)))
         worst = np.array([float(x or 0.0) for x in model.baseline.get("worst", [])] or [0.0])
         variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
-        blocks = block_numbers(samples.motion, _block_seconds(samples.motion))
+        blocks = block_numbers(samples.motion, _block_seconds(samples.motion, shortest_block(model)))
         context = filtered_context(model, samples, effects)
         rows = sliding(samples, model)
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples.motion)
@@ -285,9 +287,17 @@ def _sliding(samples: Samples, model: ReconstructedModel) -> Mask:
     return sliding
 
 
-def _block_seconds(motion: Motion) -> float:
+def shortest_block(model: ReconstructedModel) -> float:
+    """Shortest block, s, of which the residual of each joint remembers but a small part of the one before."""
+    joints = model.baseline.get("joints") or [{}]
+    least, most = _SHORTEST
+    memories = [np.inf if (own := each.get("correlation_time")) is None else own for each in joints]
+    return float(np.clip(max(memories) / _REMEMBERED, least, most))
+
+
+def _block_seconds(motion: Motion, shortest: float) -> float:
     """Length of a block that leaves enough of them in all runs together, within the bounds."""
-    return float(np.clip(motion.seconds / FEWEST_BLOCKS, SHORTEST_BLOCK, BLOCK_SECONDS))
+    return float(np.clip(motion.seconds / FEWEST_BLOCKS, shortest, BLOCK_SECONDS))
 
 
 @dataclass(frozen=True, eq=False)

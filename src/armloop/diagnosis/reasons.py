@@ -8,7 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, sliding, too_slow
+from armloop.diagnosis.evidence import (
+    FAR,
+    FEWEST_BLOCKS,
+    Evidence,
+    creep,
+    far_outside,
+    shortest_block,
+    sliding,
+    too_slow,
+)
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE
 from armloop.identification.goodness import (
     WORTH_A_WORD,
@@ -106,9 +115,10 @@ def too_still(evidence: Evidence) -> str:
     blocks = len(np.unique(evidence.blocks))
     if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
         return ""
+    shortest = shortest_block(evidence.model)
     return (
-        f"too little motion to judge ({blocks} blocks of a second or more, joints whose motion does not count: {still}); "
-        f"log at least {FEWEST_BLOCKS + 1} s in which the joints move"
+        f"too little motion to judge ({blocks} blocks of {shortest:.2g} s or more, joints whose motion does not count: "
+        f"{still}); log at least {(FEWEST_BLOCKS + 1) * shortest:.2g} s in which the joints move"
     )
 
 
