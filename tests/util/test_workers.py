@@ -1,6 +1,8 @@
 """Whoever applies a function to chunks, the answers are the same and come in order."""
 
 import gc
+import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from functools import reduce
@@ -53,7 +55,6 @@ def test_a_fault_found_by_a_worker_is_the_users(anyone: Workers) -> None:
 
 
 def test_processes_really_are_others_with_one_thread() -> None:
-    import os
 
     from threadpoolctl import threadpool_info
 
@@ -89,6 +90,28 @@ def test_however_many_work_each_has_one_blas_thread() -> None:
     with threadpool_limits(2):
         for workers in (Serial(), Processes(1), Processes(2)):
             assert list(workers.map(threads, [0, 1])) == [1, 1]
+
+
+LOADED_LATER = """
+import numpy, threadpoolctl
+from armloop.util.workers import single_threaded
+
+def threads():
+    return [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
+
+for libraries in (1, 2):
+    assert threads() == [2] * libraries, threads()
+    with single_threaded():
+        assert threads() == [1] * libraries, threads()
+    import scipy.linalg
+assert threads() == [2, 2], threads()
+"""
+
+
+def test_a_library_with_threads_that_is_loaded_later_has_one_too() -> None:
+    """Which libraries there are is not asked at every call, but after every import; scipy has a BLAS of its own."""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2"}
+    subprocess.run([sys.executable, "-c", LOADED_LATER], env=environment, check=True)
 
 
 def test_a_team_keeps_what_each_has_computed() -> None:

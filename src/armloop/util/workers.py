@@ -13,11 +13,12 @@ import os
 import re
 import signal
 import socket
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
-from contextlib import suppress
-from functools import wraps
+from contextlib import AbstractContextManager, suppress
+from functools import lru_cache, wraps
 from multiprocessing import get_context
 from threading import Thread
 from typing import Any, ParamSpec, TypeVar
@@ -102,7 +103,7 @@ def _begin(parent: int, prepare: Callable[..., None] | None, arguments: tuple[An
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
     _die_with(parent)
-    _threads()
+    single_threaded()
     if prepare is not None:
         prepare(*arguments)
 
@@ -251,7 +252,7 @@ def _connect(client: Any, address: str, answer: Future[Any]) -> None:
 
 
 def _apply(function: Callable[[Chunk], Answer], chunk: Chunk) -> Answer:
-    with _threads():
+    with single_threaded():
         return function(chunk)
 
 
@@ -297,13 +298,25 @@ def one_thread(function: Callable[Arguments, Answer]) -> Callable[Arguments, Ans
 
     @wraps(function)
     def alone(*arguments: Arguments.args, **named: Arguments.kwargs) -> Answer:
-        with _threads():
+        with single_threaded():
             return function(*arguments, **named)
 
     return alone
 
 
-def _threads() -> Any:
-    from threadpoolctl import threadpool_limits
+def single_threaded() -> AbstractContextManager[Any]:
+    """One thread of BLAS and OpenMP, from now on and until the ``with`` block ends, if it is used in one."""
+    limited: AbstractContextManager[Any] = _thread_pools(frozenset(sys.modules)).limit(limits=1)
+    return limited
 
-    return threadpool_limits(1)
+
+@lru_cache(maxsize=1)
+def _thread_pools(modules: frozenset[str]) -> Any:
+    """The libraries that have threads, sought anew only after an import: of all that are loaded it takes a while.
+
+    Args:
+        modules: names of what is imported, with which such libraries are loaded.
+    """
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

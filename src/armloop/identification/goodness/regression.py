@@ -13,6 +13,7 @@ from scipy.optimize import nnls
 from armloop.identification.goodness.split import FOLDS, Split
 from armloop.regression.moments import Moments, total
 from armloop.util.arrays import TINY, Array, Index
+from armloop.util.workers import single_threaded
 
 #: Penalties of the ridge, in units of the number of samples, for columns of unit variance.
 _PENALTIES = tuple(10.0**k for k in range(-5, 2))
@@ -54,7 +55,6 @@ def _ridge(X: Array, y: Array, block: Index, asked: Array) -> Array:
 
 def _trees(X: Array, y: Array, asked: Array) -> Array:
     from sklearn.ensemble import HistGradientBoostingRegressor
-    from threadpoolctl import threadpool_limits
 
     trees = HistGradientBoostingRegressor(
         max_iter=22,
@@ -67,5 +67,5 @@ def _trees(X: Array, y: Array, asked: Array) -> Array:
         random_state=0,
     )
     # so few rows are no work for threads, which would wait for each other on a busy machine
-    with threadpool_limits(1):
+    with single_threaded():
         return np.asarray(trees.fit(X, y).predict(asked), dtype=float)
