@@ -55,7 +55,6 @@ def test_a_fault_found_by_a_worker_is_the_users(anyone: Workers) -> None:
 
 
 def test_processes_really_are_others_with_one_thread() -> None:
-
     from threadpoolctl import threadpool_info
 
     def look(_: int) -> tuple[int, int]:

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armloop.data.recorded import Finding, Recorded
+from armloop.data.recorded import Finding, Recorded, once
 from armloop.data.stamps import NEARLY, bridged, coincident
 from armloop.util.arrays import PER_MEDIAN, TINY, Array, Index, stretches
 
@@ -56,6 +56,7 @@ def repaired(log: Recorded, lag: float = 0.0) -> Recorded:
     return replace(clean, v=_in_time(clean, lag), lost=lost if lost.any() else None)
 
 
+@once
 def mended(log: Recorded) -> Recorded:
     """The record with what lies beside them in place of rows that coincide, repeated rows and spikes."""
     return _without_spikes(_moving_on(_at_their_instants(log)))
@@ -139,6 +140,7 @@ def dropouts(log: Recorded) -> Iterator[Finding]:
             )
 
 
+@once
 def spikes(log: Recorded) -> dict[tuple[str, int], Index]:
     """Rows of the spikes of each column that has any, by kind and joint (0-based).
 

@@ -183,9 +183,14 @@ class MotionLog:
         return float(np.median(np.diff(self.time)))
 
     @cached_property
+    def record(self) -> Recorded:
+        """The arrays as checks see them, with what was found of them once the log is conditioned."""
+        return recorded(self)
+
+    @cached_property
     def velocity_lag(self) -> float:
         """The group delay of v behind dq/dt in seconds, 0 if none is sure (see :mod:`armloop.data.redundancy`)."""
-        return velocity_lag(mended(recorded(self)))
+        return velocity_lag(mended(self.record))
 
     def runs(self) -> list[slice]:
         """Return the stretches without a gap as slices; never filter or differentiate across two of them."""

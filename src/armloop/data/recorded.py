@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import wraps
+from typing import Any, TypeVar
 
 from armloop.util.arrays import Array, Mask
+
+
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
@@ -39,3 +44,16 @@ class Recorded:
     runs: Sequence[slice]
     derived: bool = False
     lost: Mask | None = None
+    _known: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+
+def once(function: Callable[[Recorded], Answer]) -> Callable[[Recorded], Answer]:
+    """Memoization: what a function of a record came to is kept with the record, and asked for again is not sought anew."""
+
+    def known(log: Recorded) -> Answer:
+        if function.__name__ not in log._known:
+            log._known[function.__name__] = function(log)
+        answer: Answer = log._known[function.__name__]
+        return answer
+
+    return wraps(function)(known)

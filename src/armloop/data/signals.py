@@ -17,7 +17,7 @@ import numpy as np
 
 from armloop.data.dropouts import later, repaired
 from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
-from armloop.data.log import FEWEST_SAMPLES, MotionLog, recorded
+from armloop.data.log import FEWEST_SAMPLES, MotionLog
 from armloop.data.motion import Motion, Samples
 from armloop.data.recorded import Recorded
 from armloop.util.arrays import PER_MEDIAN, Array, Mask
@@ -153,7 +153,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, speeds: Speeds | No
     parts, spans = [], []
     for log in logs:
         lag = log.velocity_lag
-        fresh = repaired(recorded(log), lag if lag * how.cutoff_hz >= FELT else 0.0)
+        fresh = repaired(log.record, lag if lag * how.cutoff_hz >= FELT else 0.0)
         for run in log.runs():
             part = _condition_run(fresh, run, how, how.dead_zone * speeds.noise)
             if part is not None:

@@ -233,13 +233,13 @@ def _shape_problem(
     evidence, current = known.evidence, known.fit
     each = [evidence.smoothed(effect, shape) for shape in shapes]
     width = max(columns.shape[-1] for columns in each)
-    # some shapes need fewer
-    each = [np.pad(c, [(0, 0)] * (c.ndim - 1) + [(0, width - c.shape[-1])]) for c in each]
     parts, left, outside, fold = [], [], [], []
     for j in joints:
         rows = evidence.rows[evidence.independent, j]
-        columns = np.hstack([(c if c.ndim == 2 else c[:, j])[rows] for c in each])
-        parts.append(columns.reshape(len(columns), len(shapes), width) / evidence.scale[j])
+        columns = np.zeros((np.count_nonzero(rows), len(shapes), width))
+        for k, c in enumerate(each):  # some shapes need fewer
+            columns[:, k, : c.shape[-1]] = (c if c.ndim == 2 else c[:, j])[rows]
+        parts.append(columns / evidence.scale[j])
         mine = current.stacked.joint == j
         left.append(current.held_out[mine])
         outside.append(current.outside[:, mine])
