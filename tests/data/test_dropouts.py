@@ -256,3 +256,20 @@ def test_lost_torques_count_for_nothing_as_far_as_the_filter_smears_them() -> No
     # beyond the reach next to nothing is left of the fault
     off = np.abs(worn.tau - clean.tau)[:, 0]
     assert off[~lost].max() < 0.1 * off.max()
+
+
+def test_they_are_sought_once_a_log_however_often_it_is_conditioned(monkeypatch: pytest.MonkeyPatch) -> None:
+    sought: list[Recorded] = []
+    large = dropouts._large
+
+    def counted(steps: np.ndarray, resolution: float) -> tuple[float, np.ndarray]:
+        sought.append(log.record)
+        return large(steps, resolution)
+
+    monkeypatch.setattr(dropouts, "_large", counted)
+    log = a_log()
+    for cutoff in (10.0, 5.0, 2.0):
+        preprocess([log], Conditioning(cutoff_hz=cutoff))
+    assert len(sought) == 2 * 6  # two clocks, six columns
+    preprocess([replace(log, tau=log.tau + 1.0)], Conditioning())
+    assert len(sought) == 2 * 2 * 6

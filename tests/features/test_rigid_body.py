@@ -1,5 +1,6 @@
 """Base parameters: counts known from the literature, torques kept exactly, readable sums, the three steps."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,18 @@ def test_rotor_inertias_merge_where_the_link_already_shows_them():
 def test_without_gravity_a_first_moment_about_the_first_axis_is_not_seen():
     base = BaseParameters.of_arm(upright_pendulum(gravity=(0.0, 0.0, 0.0)))
     assert base.names == ["Iyy1 + 0.25 m2", "mx2", "mz2", "Iyy2"]
+
+
+def test_they_are_found_once_for_all_arms_that_move_alike():
+    arm = upright_pendulum()
+    base = BaseParameters.of_arm(arm, rotors=True)
+    assert BaseParameters.of_arm(replace(arm, name="another", mass=2 * arm.mass), rotors=True) is base
+    sliding = tuple(replace(joint, kind="prismatic") for joint in arm.joints)
+    others = (arm.with_zero(1, 0.1), replace(arm, gravity=-arm.gravity), replace(arm, joints=sliding))
+    for other in (BaseParameters.of_arm(arm), *(BaseParameters.of_arm(one, rotors=True) for one in others)):
+        assert other is not base
+    with pytest.raises(ValueError, match="read-only"):
+        base.grouping[0, 0] = 2.0
 
 
 @pytest.mark.parametrize("make", [upright_pendulum, scara])

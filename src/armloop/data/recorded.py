@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 
 from armloop.util.arrays import Array, Mask
 
-
 Answer = TypeVar("Answer")
 
 

@@ -10,7 +10,8 @@ motion (Gautier, "Numerical calculation of the base inertial parameters of robot
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -78,15 +79,7 @@ class BaseParameters:
         Sums are led by parameters near the base: a link's mass is shared out over the links before it,
         as is usual. Which parameters can be seen depends on ``arm.gravity`` too.
         """
-        columns = full_columns(arm, random_motion(arm.n, _EXCITATION, seed), rotors)
-        rows = columns.reshape(-1, columns.shape[2])
-        within = [LINK_PARAMETERS.index(name) for name in _PREFERENCE]
-        order = [10 * link + index for link in range(arm.n) for index in within]
-        kept = _independent(rows, [*order, *range(10 * arm.n, rows.shape[1])])
-        grouping: Array = np.linalg.lstsq(rows[:, kept], rows, rcond=None)[0].astype(float)
-        grouping[np.abs(grouping) < _TOLERANCE] = 0.0
-        grouping[:, kept] = np.eye(len(kept))
-        return cls(kept, grouping, rotors)
+        return _base_parameters(_Structure.of(arm), rotors, seed)
 
     @property
     def count(self) -> int:
@@ -127,18 +120,51 @@ class BaseParameters:
         return np.asarray(start + change)
 
 
+@dataclass(frozen=True)
+class _Structure:
+    """An arm by what its regressor depends on, so that arms that agree in that are one."""
+
+    arm: Arm = field(compare=False)
+    kinds: tuple[str, ...]
+    numbers: bytes
+
+    @staticmethod
+    def of(arm: Arm) -> _Structure:
+        numbers = (np.ascontiguousarray(x, dtype=float).tobytes() for x in (arm.X_PF, arm.axis, arm.gravity))
+        return _Structure(arm, tuple(joint.kind for joint in arm.joints), b"".join(numbers))
+
+
+@lru_cache(maxsize=512)
+def _base_parameters(structure: _Structure, rotors: bool, seed: int) -> BaseParameters:
+    """Memoization of :meth:`BaseParameters.of_arm`: each check of a record, and each step of a fit, asks for its arm's."""
+    arm = structure.arm
+    columns = full_columns(arm, random_motion(arm.n, _EXCITATION, seed), rotors)
+    rows = columns.reshape(-1, columns.shape[2])
+    within = [LINK_PARAMETERS.index(name) for name in _PREFERENCE]
+    order = [10 * link + index for link in range(arm.n) for index in within]
+    kept = _independent(rows, [*order, *range(10 * arm.n, rows.shape[1])])
+    grouping: Array = np.linalg.lstsq(rows[:, kept], rows, rcond=None)[0].astype(float)
+    grouping[np.abs(grouping) < _TOLERANCE] = 0.0
+    grouping[:, kept] = np.eye(len(kept))
+    for shared in (kept, grouping):
+        shared.setflags(write=False)
+    return BaseParameters(kept, grouping, rotors)
+
+
 def _independent(rows: Array, order: list[int]) -> Index:
     """Indices, rising, of the columns that are not sums of those before them in ``order``."""
-    basis, kept = np.empty((len(rows), 0)), []
+    basis = np.empty((min(rows.shape), len(rows)))  # a unit vector a row
+    kept: list[int] = []
     sizes = np.linalg.norm(rows, axis=0)
     for index in order:
         column, size = rows[:, index], sizes[index]
         if size <= _TOLERANCE * sizes.max():  # what no torque feels is round-off, not exactly zero
             continue
-        own = column / size
+        own, known = column / size, basis[: len(kept)]
         for _ in range(2):  # Gram-Schmidt twice is orthogonal to machine precision
-            own = own - basis @ (basis.T @ own)
-        if np.linalg.norm(own) > _TOLERANCE:
-            basis = np.column_stack([basis, own / np.linalg.norm(own)])
+            own -= (known @ own) @ known
+        left = np.linalg.norm(own)
+        if left > _TOLERANCE:
+            basis[len(kept)] = own / left
             kept.append(index)
     return np.sort(np.array(kept, dtype=np.intp))
