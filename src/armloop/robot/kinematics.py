@@ -42,21 +42,30 @@ class LinkMotion:
 
 def _cross(x: Array, y: Array) -> Array:
     """x × y along the first axis; the others broadcast (np.cross takes several times as long)."""
-    out = np.empty(np.broadcast_shapes(x.shape, y.shape))
-    out[0] = x[1] * y[2] - x[2] * y[1]
-    out[1] = x[2] * y[0] - x[0] * y[2]
-    out[2] = x[0] * y[1] - x[1] * y[0]
+    first = x[1] * y[2]
+    out = np.empty((3, *first.shape))
+    np.subtract(first, x[2] * y[1], out=out[0])
+    np.multiply(x[2], y[0], out=out[1])
+    out[1] -= x[0] * y[2]
+    np.multiply(x[0], y[1], out=out[2])
+    out[2] -= x[1] * y[0]
     return out
 
 
 def _out_of(R: Array, x: Array) -> Array:
     """Express x (3, ..., N) of the frame whose rotation is R (3, 3, ..., N) in the previous frame: R x."""
-    return np.asarray(R[:, 0] * x[0] + R[:, 1] * x[1] + R[:, 2] * x[2])
+    out = np.asarray(R[:, 0] * x[0])
+    out += R[:, 1] * x[1]
+    out += R[:, 2] * x[2]
+    return out
 
 
 def _into(R: Array, x: Array) -> Array:
     """Express x (3, N) of the previous frame in the frame whose rotation is R (3, 3, N): Rᵀ x."""
-    return np.asarray(R[0] * x[0] + R[1] * x[1] + R[2] * x[2])
+    out = np.asarray(R[0] * x[0])
+    out += R[1] * x[1]
+    out += R[2] * x[2]
+    return out
 
 
 def link_motion(arm: Arm, q: Array, v: Array, vdot: Array, gravity: Array | None = None) -> LinkMotion:
@@ -95,28 +104,30 @@ def link_motion(arm: Arm, q: Array, v: Array, vdot: Array, gravity: Array | None
     return LinkMotion(R, p, w, wdot, a)
 
 
-def _inertia_columns(w: Array) -> Array:
-    """(3, 6, N): w (3, N) -> L with I w = L [Ixx Iyy Izz Ixy Ixz Iyz]."""
-    out = np.zeros((3, 6, w.shape[1]))
-    x, y, z = w
-    out[0, 0], out[0, 3], out[0, 4] = x, y, z
-    out[1, 1], out[1, 3], out[1, 5] = y, x, z
-    out[2, 2], out[2, 4], out[2, 5] = z, x, y
-    return out
+def _wrench_columns(w: Array, wdot: Array, a: Array) -> Array:
+    """(3, 14, N) force per unit of m, mx, my, mz of a link (it depends on no others), then moment about the link's
+    origin per unit of each of its parameters.
 
-
-def _wrench_columns(w: Array, wdot: Array, a: Array) -> tuple[Array, Array]:
-    """Force (3, 4, N) per unit of m, mx, my, mz of a link (it depends on no others), and moment (3, 10, N) about the
-    link's origin per unit of each of its parameters.
+    The force is m a + (wdot × + w × w ×) mc, the moment mc × a + I wdot + w × I w, written out for each.
     """
-    N = w.shape[1]
-    force, moment = np.empty((3, 4, N)), np.zeros((3, 10, N))
-    axes = np.eye(3)[:, :, None]
+    wrench = np.zeros((3, 14, w.shape[1]))
+    force, moment = wrench[:, :4], wrench[:, 4:]
+    (x, y, z), (X, Y, Z) = w, wdot
+    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
     force[:, 0] = a
-    force[:, 1:] = _cross(wdot[:, None], axes) + _cross(w[:, None], _cross(w[:, None], axes))
-    moment[:, 1:4] = _cross(axes, a[:, None])
-    moment[:, 4:] = _inertia_columns(wdot) + _cross(w[:, None], _inertia_columns(w))
-    return force, moment
+    force[:, 1] = -yy - zz, xy + Z, xz - Y
+    force[:, 2] = xy - Z, -xx - zz, yz + X
+    force[:, 3] = xz + Y, yz - X, -xx - yy
+    moment[1, 1], moment[2, 1] = -a[2], a[1]
+    moment[0, 2], moment[2, 2] = a[2], -a[0]
+    moment[0, 3], moment[1, 3] = -a[1], a[0]
+    moment[:, 4] = X, xz, -xy
+    moment[:, 5] = -yz, Y, xy
+    moment[:, 6] = yz, -xz, Z
+    moment[:, 7] = Y - xz, X + yz, xx - yy
+    moment[:, 8] = Z + xy, zz - xx, X - yz
+    moment[:, 9] = yy - zz, Z - xy, Y + xz
+    return wrench
 
 
 def regressor(
@@ -140,14 +151,19 @@ def regressor(
 
 def _fill(Y: Array, arm: Arm, motion: LinkMotion, link: int) -> None:
     """Write the columns of one link's parameters, (N, n, 10): its wrench, carried inwards along the chain."""
-    force, moment = _wrench_columns(motion.w[link], motion.wdot[link], motion.a[link])
+    wrench = _wrench_columns(motion.w[link], motion.wdot[link], motion.a[link])
     for i in range(link, -1, -1):
-        wrench = moment if arm.joints[i].kind == "revolute" else force
-        Y[:, i, : wrench.shape[1]] = np.tensordot(arm.axis[i], wrench, 1).T
+        felt = wrench[:, 4:] if arm.joints[i].kind == "revolute" else wrench[:, :4]
+        Y[:, i, : felt.shape[1]] = _along(arm.axis[i], felt).T
         if i:
-            R = motion.R[i][:, :, None]
-            force, moment = _out_of(R, force), _out_of(R, moment)
-            moment[:, :4] += _cross(motion.p[i][:, None], force)
+            wrench = _out_of(motion.R[i][:, :, None], wrench)
+            wrench[:, 4:8] += _cross(motion.p[i][:, None], wrench[:, :4])
+
+
+def _along(axis: Array, x: Array) -> Array:
+    """The component of x (3, ..., N) along an axis (3,), most often a frame's own."""
+    (used,) = np.nonzero(axis)
+    return x[used[0]] if len(used) == 1 and axis[used[0]] == 1 else np.tensordot(axis, x, 1)
 
 
 def nominal_parameters(arm: Arm) -> Array:
