@@ -14,6 +14,7 @@ many independent samples the data are worth is the caller's to say.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from itertools import combinations
 from operator import itemgetter
 
@@ -89,10 +90,15 @@ class _Fit:
 
     def between(self, some: Index, spread: Array, columns: Index) -> Array:
         """(K, c, c) products of columns (K, c) outside the support without some of its terms."""
-        G = self.moments.G[columns[:, :, None], columns[:, None, :]]
-        G = G - self.onto[columns] @ self.moments.G[self.support[None, :, None], columns[:, None, :]]
         part = np.take_along_axis(spread, columns[:, None, :], axis=2)
-        return np.asarray(G + self.onto[columns[:, :, None], some[:, None, :]] @ part)
+        products = self.onto[columns[:, :, None], some[:, None, :]] @ part
+        products += self._outside.take(columns[:, :, None] * len(self._outside) + columns[:, None, :])
+        return np.asarray(products)
+
+    @cached_property
+    def _outside(self) -> Array:
+        """(p, p) products of the columns outside the support: what all its exchanges begin with."""
+        return np.asarray(self.moments.G - self.onto @ self.moments.G[self.support])
 
 
 def _gains(own: Array, left: Array) -> Array:
@@ -112,15 +118,16 @@ def _pair_gains(G: Array, left: Array) -> Array:
     r = G * scale[:, :, None]
     r *= scale[:, None, :]
     area = 1.0 - r * r
-    area[spanned] = 0.0
-    area.transpose(0, 2, 1)[spanned] = 0.0
+    if spanned.any():
+        area[spanned] = 0.0
+        area.transpose(0, 2, 1)[spanned] = 0.0
     np.einsum("kcc->kc", area)[:] = 0.0
     r *= -2 * z[:, :, None]
     r *= z[:, None, :]
     r += (z * z)[:, :, None]
     r += (z * z)[:, None, :]
     r[area <= _NEARLY_ONE] = 0.0
-    r /= np.maximum(area, _NEARLY_ONE)
+    r /= np.maximum(area, _NEARLY_ONE, out=area)
     return r
 
 
