@@ -58,11 +58,11 @@ def evidence(model: ReconstructedModel, *logs: MotionLog) -> Evidence:
     return Evidence.of(model, preprocess(list(logs), model.conditioning), hypotheses(model.arm))
 
 
-@pytest.mark.parametrize("seed", [*(pytest.param(k, marks=pytest.mark.long) for k in (1, 2)), 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3))])
 def test_a_load_carried_at_times_is_found_with_its_mass_and_when(
-    model: ReconstructedModel, seed: int
+    model: ReconstructedModel, carried: Diagnosis, seed: int
 ) -> None:
-    found = diagnose(model, [run(seed, TIMES)], jobs=1)
+    found = carried if seed == 1 else diagnose(model, [run(seed, TIMES)], jobs=1)
     assert found.verdict == "effects_found" and found.named == [("carried_load", None)]
     (entry,) = found.to_dict()["effects"]
     p = entry["parameters"]

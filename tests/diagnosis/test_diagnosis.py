@@ -273,8 +273,10 @@ def test_several_runs_are_judged_together_and_order_does_not_matter(model: Recon
         check_parameters(effect["parameters"], expected)
 
 
-def test_the_answer_has_the_published_shape(model: ReconstructedModel) -> None:
-    answer = json.loads(json.dumps(diagnose(model, [run(CASES["torque_offset", 3][0], seed=8)]).to_dict()))
+def test_the_answer_has_the_published_shape(
+    diagnosed: Callable[[Place], tuple[MotionLog, Diagnosis]],
+) -> None:
+    answer = json.loads(json.dumps(diagnosed(("torque_offset", 3))[1].to_dict()))
     assert answer["schema"] == "armloop/diagnosis/2"
     assert set(answer) >= {"schema", "verdict", "effects", "error"}
     assert set(answer["error"]) >= {"metric", "held_out", "unit", "before", "after", "noise_floor"}
