@@ -16,7 +16,7 @@ from armloop.data.log import MotionLog
 from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.diagnosis import carried as carrying
-from armloop.diagnosis.account import best_account
+from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.carried import account_with_load, find_carried
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.next_run import next_run
@@ -56,6 +56,14 @@ def carried(model: ReconstructedModel) -> Diagnosis:
 
 def evidence(model: ReconstructedModel, *logs: MotionLog) -> Evidence:
     return Evidence.of(model, preprocess(list(logs), model.conditioning), hypotheses(model.arm))
+
+
+@pytest.fixture(scope="module")
+def accounts(model: ReconstructedModel) -> tuple[Evidence, Account, Account | None]:
+    """The evidence of that run, the best account of it without a load, and with one."""
+    whole = evidence(model, run(1, TIMES))
+    account = best_account(whole, [], silent)
+    return whole, account, account_with_load(whole, account, silent, 1)
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3))])
@@ -255,18 +263,17 @@ def test_a_start_of_too_few_samples_explains_nothing(
 
 
 def test_a_load_at_the_cost_of_other_joints_is_none(
-    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+    accounts: tuple[Evidence, Account, Account | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """However much it removes of all joints together."""
-    whole = evidence(model, run(1, TIMES))
-    account = best_account(whole, [], silent)
+    whole, account, with_load = accounts
     asked: list[Any] = []
 
     def leaves_more(loaded: Any, plain: Any, least: np.ndarray) -> bool:
         asked.append((loaded, plain, least))
         return True
 
-    assert account_with_load(whole, account, silent, 1) is not None
+    assert with_load is not None
     monkeypatch.setattr(carrying, "leaves_more", leaves_more)
     assert account_with_load(whole, account, silent, 1) is None
     ((loaded, plain, least),) = asked
@@ -274,11 +281,11 @@ def test_a_load_at_the_cost_of_other_joints_is_none(
     assert loaded.error < plain.error / 4 and (least >= 0.4 * plain.rows).all()
 
 
-def test_the_account_with_a_load_is_one_of_the_model_as_it_is(model: ReconstructedModel) -> None:
+def test_the_account_with_a_load_is_one_of_the_model_as_it_is(
+    model: ReconstructedModel, accounts: tuple[Evidence, Account, Account | None]
+) -> None:
     """What remains of it is what the model leaves with the load once, not twice."""
-    whole = evidence(model, run(1, TIMES))
-    account = best_account(whole, [], silent)
-    found = account_with_load(whole, account, silent, 1)
+    whole, _, found = accounts
     assert found is not None and found.whole.model is model
     assert [each.effect.name for each in found.outcome.found] == ["carried_load"]
     left = np.sqrt(np.mean((found.remaining() / whole.scale)[found.evidence.rows] ** 2))
