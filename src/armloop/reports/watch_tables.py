@@ -12,6 +12,9 @@ from armloop.reports.words import counted, place, wrapped
 if TYPE_CHECKING:
     from armloop.watch import Outcome
 
+#: A terminal shows so many notes, and so many logs set aside; a fleet may have hundreds.
+_LISTED = 10
+
 
 def moment(when: float) -> str:
     """A time, UTC, to the minute."""
@@ -68,10 +71,16 @@ def watch_words(outcome: Outcome) -> str:
             lines += [wrapped(text, "  ") for text in alarm_words(alarm)]
     else:
         lines.append("no new alarm")
+    notes = [f"{arm['arm']}: {note}" for arm in outcome.arms for note in arm["notes"]]
+    if notes:  # "no new alarm" is no comfort where none was possible
+        lines.append("")
+        lines += [wrapped(note) for note in notes[:_LISTED]]
+        if len(notes) > _LISTED:
+            lines.append(f"… and {len(notes) - _LISTED} more notes (--json, --report)")
     if outcome.aside:
-        lines.append("\n" + str(aside_table(outcome.aside[:10], "Set aside")))
-        if len(outcome.aside) > 10:
-            lines.append(f"… and {len(outcome.aside) - 10} more (STORE/aside)")
+        lines.append("\n" + str(aside_table(outcome.aside[:_LISTED], "Set aside")))
+        if len(outcome.aside) > _LISTED:
+            lines.append(f"… and {len(outcome.aside) - _LISTED} more (STORE/aside)")
     lines.append(
         f"\npromise: a mean time of at least {outcome.hours:g} h of operation between false alarms of one whole arm"
     )
