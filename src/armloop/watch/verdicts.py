@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.diagnosis import diagnose
@@ -19,6 +20,7 @@ from armloop.monitoring.alarms import Alarm, Watched, find_alarms
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Named, Normal, later_part, name_change
 from armloop.monitoring.ranks import HORIZON, soonest, threshold
+from armloop.monitoring.serial import serial_correlation
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
 from armloop.monitoring.warmth import Adjusted, adjust, warms, without_warmth
@@ -36,6 +38,8 @@ _BEFORE, _DIAGNOSED = 40, 150.0
 #: Units after an alarm with which step and drift are told apart; after how many its effect is named again, for few units
 #: tell joints and laws apart badly where healthy ones differ; and logs that are read at once.
 _AFTER, _AGAIN, _AT_ONCE = 64, (4, 8, 16, 32, 64), 256
+#: Fewest healthy units whose order says whether they resemble each other.
+_FEWEST_IN_ORDER = 12
 #: Friction falls by a fifth as joints warm (published for UR3 and UR5); a change within this part may be that.
 _WARM_UP = "friction falls by up to a fifth as a joint warms up; columns temperature or since_start would tell the two apart"
 
@@ -128,22 +132,28 @@ def examine(history: History, hours: float, healthy: int, past: Running | None =
         watched = find_alarms(
             adjusted.values[tail:], own.programme, tolerance, listed, promised, reached.moved(-before)
         )
-    return Tested(history, listed, adjusted, watched, before, tail, _notes(adjusted.values[:healthy]))
+    return Tested(
+        history,
+        listed,
+        adjusted,
+        watched,
+        before,
+        tail,
+        _notes(adjusted.values[:healthy], units.programme[:healthy]),
+    )
 
 
-def _notes(values: Array) -> tuple[str, ...]:
+def _notes(values: Array, programme: NDArray[np.intp]) -> tuple[str, ...]:
     """What a reader must know of the promise's premise: whether healthy units follow each other like strangers."""
-    if len(values) < 12:
+    correlations, count = serial_correlation(values, programme)
+    known = correlations[np.isfinite(correlations)]
+    if count < _FEWEST_IN_ORDER or not len(known) or np.median(known) < 2.0 / np.sqrt(count):
         return ()
-    ranks = np.argsort(np.argsort(values, axis=0), axis=0).astype(float)
-    ranks -= ranks.mean(axis=0)
-    lagged = (ranks[1:] * ranks[:-1]).sum(axis=0) / (ranks**2).sum(axis=0)
-    typical = float(np.median(lagged[np.isfinite(values).all(axis=0)])) if len(lagged) else 0.0
-    if typical < 2.0 / np.sqrt(len(values)):
-        return ()
+    several = len(np.unique(programme)) > 1
     return (
-        f"successive healthy logs resemble each other (rank correlation {typical:.2f}): the promise on false alarms takes "
-        "them as interchangeable; sort them by programme (ARM/PROGRAMME/log) or make each log longer",
+        f"successive healthy logs{' of one programme' if several else ''} resemble each other (rank correlation "
+        f"{np.median(known):.2f}): the promise on false alarms takes them as interchangeable; "
+        f"{'' if several else 'sort them by programme (ARM/PROGRAMME/log) or '}make each log longer",
     )
 
 
