@@ -79,6 +79,7 @@ def run(options: Watch) -> int:
     )
     tell = progress(options)
     told: list[str] = []
+    diagnosed: list[str] = []
     outcome, counts = None, Counts()
     for places in _batches(sys.stdin) if options.logs == ["-"] else [options.logs]:
         outcome = watch(options.models, find_logs(places), options.store, how, tell)
@@ -88,10 +89,11 @@ def run(options: Watch) -> int:
             print(watch_words(outcome), flush=True)
             _announce(options.store, outcome.new)
         told += outcome.new
+        diagnosed += outcome.diagnosed
         counts += outcome.counts
     if outcome is None:
         outcome = watch(options.models, [], options.store, how, tell)
-    outcome = replace(outcome, counts=counts)
+    outcome = replace(outcome, counts=counts, diagnosed=diagnosed)
     if options.report is not None:
         from armloop.reports.watch_report import watch_report
 

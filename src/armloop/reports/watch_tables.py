@@ -70,7 +70,11 @@ def watch_words(outcome: Outcome) -> str:
             lines.append(f"\n{alarm['arm']}:")
             lines += [wrapped(text, "  ") for text in alarm_words(alarm)]
     else:
-        lines.append("no new alarm")
+        lines.append("no new alarm" + (f"; {len(outcome.alarms)} told before" if outcome.alarms else ""))
+    for alarm in outcome.alarms:
+        if alarm["id"] in outcome.diagnosed:
+            lines.append(f"\n{alarm['arm']}, alarm of {moment(alarm['when'])}, diagnosed now:")
+            lines += [wrapped(text, "  ") for text in alarm_words(alarm)]
     notes = [f"{arm['arm']}: {note}" for arm in outcome.arms for note in arm["notes"]]
     if notes:  # "no new alarm" is no comfort where none was possible
         lines.append("")

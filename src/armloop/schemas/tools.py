@@ -264,6 +264,11 @@ class AlarmData(Struct):
     alternatives: list[dict[str, Any]]
     continues: Name | None
     notes: list[Text]
+    model: Annotated[Name, Meta(description="digest of the model that it was found with")] | UnsetType = UNSET
+    healthy: Count | UnsetType = UNSET
+    window: (
+        Annotated[list[Name], Meta(description="digests of the logs that it was named from")] | UnsetType
+    ) = UNSET
     diagnosis: dict[str, Any] | UnsetType = UNSET
 
 
@@ -296,7 +301,10 @@ class AsideData(Struct):
 
 
 class WatchData(Struct):
-    """`armloop watch --json`; ``new`` are alarms that were not told before, ``alarms`` all there are, by their id."""
+    """`armloop watch --json`; ``new`` are alarms that were not told before, ``alarms`` all there are, by their id.
+
+    ``diagnosed`` are alarms that were told before, and whose logs were diagnosed in this call.
+    """
 
     schema: Literal["armloop/watch/1"]
     logs: LogCountsData
@@ -304,5 +312,6 @@ class WatchData(Struct):
     operation_hours: _Hours
     promise: PromiseData
     new: list[AlarmData]
+    diagnosed: list[AlarmData]
     alarms: list[Name]
     set_aside: list[AsideData]

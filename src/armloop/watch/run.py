@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +28,9 @@ class Outcome:
     Attributes:
         counts: of the logs that were given.
         arms: what the tests of each arm came to (``tested/arm=A.json``).
-        alarms: all alarms in the store, by time.
+        alarms: all alarms in the store that stand, by time.
         new: identifiers of those that were never told.
+        diagnosed: identifiers of those that were told before, and whose logs were diagnosed in this call.
         aside: logs set aside, with their reasons.
     """
 
@@ -39,6 +40,7 @@ class Outcome:
     new: list[str]
     aside: list[dict[str, Any]]
     hours: float
+    diagnosed: list[str] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``--json``."""
@@ -58,6 +60,7 @@ class Outcome:
                 "of": "one whole arm, all joints and effects together",
             },
             "new": [alarm for alarm in self.alarms if alarm["id"] in self.new],
+            "diagnosed": [alarm for alarm in self.alarms if alarm["id"] in self.diagnosed],
             "alarms": [alarm["id"] for alarm in self.alarms],
             "set_aside": self.aside,
         }
@@ -99,14 +102,35 @@ def watch(
             if own:
                 mine = {log: place for log, place in places.items() if log in own}
                 tasks.append(Task(folder.folder, arm, path, mine, options))
-        tell, arms = paced(progress), []
+        tell, arms, before = paced(progress), [], _diagnosed(folder)
         for answer in workers.map(test_arm, tasks) if tasks else ():
             arms.append(answer)
             tell(f"tested {len(arms)} of {len(tasks)} arms")
-        alarms = folder.alarms()
-        told = folder.announced()
+        alarms = _standing(folder.alarms(), arms)
+        told, after = folder.announced(), _diagnosed(folder) - before
         new = [alarm["id"] for alarm in alarms if alarm["id"] not in told]
-        return Outcome(counts, arms, alarms, new, folder.aside(), options.hours)
+        late = [alarm["id"] for alarm in alarms if alarm["id"] in told & after]
+        return Outcome(counts, arms, alarms, new, folder.aside(), options.hours, late)
+
+
+def _standing(alarms: list[dict[str, Any]], arms: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The alarms without those of a time that has been tested anew, with another model or other options, or late logs.
+
+    What the present tests do not go back to (an arm that is tested no more, logs that are gone) stands as it was found.
+    """
+    tested = {arm["arm"]: arm for arm in arms}
+    return [
+        alarm
+        for alarm in alarms
+        if (own := tested.get(alarm["arm"])) is None
+        or alarm["id"] in own["alarms"]
+        or alarm["when"] < own["first"]
+    ]
+
+
+def _diagnosed(store: Store) -> set[str]:
+    """Identifiers of the alarms whose logs were diagnosed."""
+    return {alarm["id"] for alarm in store.alarms() if "logs" in alarm.get("diagnosis", {})}
 
 
 @contextlib.contextmanager

@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.log import MotionLog
-from armloop.diagnosis import diagnose
 from armloop.laws.effects.base import Place
 from armloop.model import ReconstructedModel
 from armloop.monitoring.alarms import Alarm, Watched, find_alarms
@@ -25,16 +23,15 @@ from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
 from armloop.monitoring.warmth import Adjusted, adjust, warms, without_warmth
 from armloop.util.arrays import Array
-from armloop.util.errors import InputError
 from armloop.util.finite import finite
+from armloop.watch.diagnosed import diagnose_alarms
 from armloop.watch.fleet import model_and_digest
 from armloop.watch.history import Head, History
 from armloop.watch.running import Last, Running, stored
-from armloop.watch.sources import LogFile, read_recording
 from armloop.watch.store import Store
 
-#: Healthy units before a change whose normal equations say what was there before, and seconds of logs that are diagnosed.
-_BEFORE, _DIAGNOSED = 40, 150.0
+#: Healthy units before a change whose normal equations say what was there before.
+_BEFORE = 40
 #: Units after an alarm with which step and drift are told apart; after how many its effect is named again, for few units
 #: tell joints and laws apart badly where healthy ones differ; and logs that are read at once.
 _AFTER, _AGAIN, _AT_ONCE = 64, (4, 8, 16, 32, 64), 256
@@ -167,12 +164,22 @@ def test_arm(task: Task) -> dict[str, Any]:
     """Test an arm's new logs, name what each new alarm is, and keep both; what was tested before is not again."""
     store = Store(task.store)
     model, digest = model_and_digest(task.model)
-    asked = json.dumps([digest, task.options.hours, task.options.healthy, task.options.full])
+    asked = json.dumps([digest, float(task.options.hours), task.options.healthy])
     files = stored(store, task.arm, digest)
     mark = hashlib.sha256(json.dumps([asked, sorted(files)]).encode()).hexdigest()[:16]
     answer = store.tested(task.arm)
-    if answer is not None and answer["mark"] == mark:
-        return answer
+    if answer is None or answer["mark"] != mark:
+        answer = _test(task, store, model, asked, mark, files)
+    if task.options.full:
+        diagnose_alarms(store, task.arm, model, answer["alarms"], task.places)
+    return answer
+
+
+def _test(
+    task: Task, store: Store, model: ReconstructedModel, asked: str, mark: str, files: Mapping[str, Path]
+) -> dict[str, Any]:
+    """What the tests of an arm come to with all that is stored of it; kept, with ``mark`` saying of what it is."""
+    digest = json.loads(asked)[0]
     past = Running.load(store, task.arm, digest)
     if past is None or past.asked != asked or not past.seen <= files.keys():
         past = Running(asked)
@@ -193,6 +200,7 @@ def test_arm(task: Task) -> dict[str, Any]:
         "logs": len(past.seen),
         "units": past.count,
         "hours": past.seconds / 3600.0,
+        "first": float(past.history.units.when[0]),
         "last": float(past.history.units.when[-1]),
         "limit": past.limit,
         "warmth": past.known,
@@ -227,12 +235,13 @@ def _advance(task: Task, store: Store, model: ReconstructedModel, past: Running,
     for found in watched.alarms:
         alarm = found.moved(tested.before)
         _judge(task, store, model, tested, names, last, alarm.unit)
-        name = _identifier(task.arm, history, tested.at(alarm.unit))
+        name = _identifier(task.arm, past.asked, history, tested.at(alarm.unit))
         earlier = store.alarm(task.arm, names[-1]) if names else None
-        known = store.alarm(task.arm, name)
-        explained, stream = _explain(task, model, tested, alarm, name, earlier, known is None)
-        if known is None:
-            store.add_alarm(task.arm, name, explained)
+        explained, stream = _explain(task, model, tested, alarm, name, past.asked, earlier)
+        known = store.alarm(task.arm, name) or {}
+        if "diagnosis" in known and known.get("window") == explained["window"]:
+            explained["diagnosis"] = known["diagnosis"]
+        store.add_alarm(task.arm, name, explained)
         names.append(name)
         last = Last(name, alarm, tuple(watched.evidence[found.unit].tolist()), stream)
     last = _judge(task, store, model, tested, names, last, count - 1)
@@ -313,8 +322,9 @@ def _as_named(tested: Tested, named: Sequence[Named], earlier: dict[str, Any] | 
     }
 
 
-def _identifier(arm: str, history: History, at: int) -> str:
-    text = f"{arm} {history.logs[history.units.log[at]].log} {history.pieces[at, 0]}"
+def _identifier(arm: str, asked: str, history: History, at: int) -> str:
+    """An alarm's name: of the arm, the unit with which it came, and what was asked (model and options)."""
+    text = f"{arm} {asked} {history.logs[history.units.log[at]].log} {history.pieces[at, 0]}"
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
@@ -335,10 +345,10 @@ def _explain(
     tested: Tested,
     alarm: Alarm,
     name: str,
+    asked: str,
     earlier: dict[str, Any] | None,
-    new: bool,
 ) -> tuple[dict[str, Any], int]:
-    """What an alarm says, and the stream whose history shows its course; one that is not new is not diagnosed again."""
+    """What an alarm says, and the stream whose history shows its course."""
     history, units = tested.history, tested.history.units
     window = [tested.at(u) for u in later_part(alarm.since, alarm.unit)]
     named = _name(task, model, tested, alarm, alarm.unit)
@@ -350,6 +360,7 @@ def _explain(
     answer: dict[str, Any] = {
         "id": name,
         "arm": task.arm,
+        "model": json.loads(asked)[0],
         "when": float(units.when[at] + units.seconds[at]),
         "since": float(units.when[since]),
         "log": history.logs[units.log[at]].name,
@@ -358,6 +369,7 @@ def _explain(
         "log_evidence": alarm.log_evidence,
         "limit": float(tested.watched.limits[alarm.unit - tested.before]),
         "false_alarm_hours": task.options.hours,
+        "healthy": task.options.healthy,
         "shown_by": {
             "effect": stream.name,
             "joint": stream.joint,
@@ -367,9 +379,8 @@ def _explain(
         **_as_named(tested, named, earlier),
         "course": _course(tested, max(alarm.from_unit, alarm.since - HORIZON), alarm.unit, column),
         "notes": list(tested.notes),
+        "window": [history.logs[log].log for log in logs],
     }
-    if task.options.full and new:
-        answer["diagnosis"] = _diagnosis(task, model, [history.logs[log].log for log in logs])
     return answer, column
 
 
@@ -418,27 +429,3 @@ def _continues(earlier: dict[str, Any] | None, named: Sequence[Named]) -> str | 
     first = earlier["effects"][0]
     same = (first["effect"], first["joint"]) == named[0].place[:2]
     return str(earlier["id"]) if same else None
-
-
-def _diagnosis(task: Task, model: ReconstructedModel, digests: Sequence[str]) -> dict[str, Any]:
-    """The verdict on the window's last logs, where they are still there."""
-    logs: list[MotionLog] = []
-    seconds = 0.0
-    for digest in reversed(digests):
-        place = task.places.get(digest)
-        if place is None or not place.exists():
-            continue
-        log = read_recording(LogFile(place, task.arm, ""), model).log
-        if logs and seconds + float(np.ptp(log.time)) > _DIAGNOSED:
-            break
-        logs.insert(0, log)
-        seconds += float(np.ptp(log.time))
-    if not logs:
-        return {
-            "reason": "the logs of the window are no longer there; the effects above are named from its sums"
-        }
-    try:
-        answer = diagnose(model, logs, jobs=1).to_dict()  # arms lie side by side
-    except InputError as error:
-        return {"reason": str(error)}
-    return {"logs": [log.name for log in logs], **answer}
