@@ -114,6 +114,7 @@ def test_units_that_come_one_by_one_tell_the_same_as_units_that_come_at_once() -
 def test_no_change_raises_an_alarm_sooner(limit: float) -> None:
     """Whatever the units are, at as many it is possible, and at one less it is not."""
     fewest = soonest(limit)
+    assert fewest is not None
     rng = np.random.default_rng(1)
     number = np.arange(fewest)[:, None]
     begins = np.arange(FEWEST, fewest)[None]
@@ -125,3 +126,18 @@ def test_no_change_raises_an_alarm_sooner(limit: float) -> None:
         axis=(1, 2)
     )
     assert found[-1] > limit >= found[:-1].max()
+
+
+def test_units_of_several_programmes_take_longer_to_raise_an_alarm() -> None:
+    """In turn, and one after the other: each programme waits for a reference of its own."""
+    one, turns = soonest(17.7), soonest(17.7, tuple(range(8)))
+    blocks = soonest(17.7, tuple(np.repeat(np.arange(8), 10).tolist()))
+    assert one is not None and turns is not None and blocks is not None
+    assert one < turns < blocks
+    # at as many it is possible
+    number, programme = np.arange(turns)[:, None], np.resize(np.arange(8), turns)
+    values = np.where(number >= np.arange(turns), 1e3 + number, number).astype(float)
+    evidence = scan(values, programme, np.zeros(turns)).log_evidence.max(axis=(1, 2))
+    assert evidence[-1] > 17.7 >= evidence[:-1].max()
+    # a programme of its own for each log
+    assert soonest(17.7, tuple(range(384))) is None

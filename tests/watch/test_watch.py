@@ -103,10 +103,36 @@ def test_so_few_logs_that_no_alarm_is_possible_are_not_called_unchanged(
     (arm,) = answer["arms"]
     (note,) = arm["notes"]
     assert re.fullmatch(r"an alarm takes \d\d units of operation, there are 3", note)
+    assert note.split()[3] == str(arm["units_for_alarm"]) and arm["units_since_alarm"] == 3
     text = page.read_text(encoding="utf-8")
     assert "Of no arm there is enough operation yet" in text and "has changed" not in text
     assert main([*arguments, "--logs", *map(str, logs), "--arm", "elbow"]) == 2
     assert "--arm elbow: there is no such arm in the store; its arms are healthy" in capsys.readouterr().err
+
+
+def test_how_many_units_an_alarm_takes_heeds_programmes_and_alarms(
+    fleet: Path, watched: Path, tmp_path: Path
+) -> None:
+    """A folder for each session is a programme for each, and nothing is ever compared."""
+    for k, log in enumerate(sorted((fleet / "logs" / "healthy").iterdir())):
+        folder = tmp_path / "logs" / "healthy" / f"session{k}"
+        folder.mkdir(parents=True)
+        (folder / log.name).symlink_to(log)
+    logs = find_logs([tmp_path / "logs"])
+    (arm,) = watch(fleet / "models", logs, tmp_path / "store", Options(full=False)).arms
+    assert arm["units_since_alarm"] == 40 < arm["units_for_alarm"]
+    (note,) = arm["notes"]
+    assert (
+        f"an alarm takes {arm['units_for_alarm']} units of operation, there are 40, in 40 programmes, at most 1"
+        in note
+    )
+    by_name = {arm["arm"]: arm for arm in watch(fleet / "models", [], watched, Options(full=False)).arms}
+    assert by_name["healthy"]["units_for_alarm"] <= by_name["healthy"]["units_since_alarm"] == 40
+    assert by_name["healthy"]["notes"] == []
+    (note,) = by_name["loaded"]["notes"]
+    since = by_name["loaded"]["units_since_alarm"]
+    assert since < 14 and f"another alarm takes {by_name['loaded']['units_for_alarm']} units" in note
+    assert note.endswith(f"there are {since} since the last one")
 
 
 def test_a_model_that_is_replaced_is_read_anew(fleet: Path, tmp_path: Path) -> None:

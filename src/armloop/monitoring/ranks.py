@@ -155,20 +155,32 @@ def _earlier_equals(codes: NDArray[np.intp], largest: int) -> NDArray[np.intp]:
     return counts
 
 
-#: An alarm is possible after fewer units of one programme than that, whatever is asked for.
-_ENOUGH = 200
+#: So many units are looked at, one number after the other, for when an alarm becomes possible.
+_LOOKED_AT = (96, 192, 384)
 
 
-@lru_cache(maxsize=16)
-def soonest(limit: float) -> int:
-    """The fewest units of one programme after which a change, however large, can bring the evidence above a limit (log)."""
-    number = np.arange(float(_ENOUGH))[:, None]
-    begins = number.T[:, FEWEST : FEWEST + HORIZON]
-    # beyond all others from some unit on: nothing is stronger evidence
-    values = np.where(number >= begins, _ENOUGH + number, number)
-    found = scan(values, np.zeros(_ENOUGH, dtype=np.intp), np.zeros(values.shape[1]))
-    over = np.flatnonzero(found.log_evidence.max(axis=(1, 2)) > limit)
-    return int(over[0]) + 1 if len(over) else _ENOUGH
+@lru_cache(maxsize=64)
+def soonest(limit: float, programmes: tuple[int, ...] = (0,)) -> int | None:
+    """The fewest units after which a change, however large, can bring the evidence above a limit (log).
+
+    Args:
+        programmes: which the units are of, those that come later going through them in the same order again. In several,
+            each has its own reference, and it takes more units.
+
+    Returns:
+        The number, or None where it is more than anyone has patience for.
+    """
+    for n in _LOOKED_AT:
+        number = np.arange(float(n))[:, None]
+        begins = np.arange(FEWEST, n, n // _LOOKED_AT[0])
+        # beyond all others from some unit on: nothing is stronger evidence
+        values = np.where(number >= begins, n + number, number)
+        programme = np.resize(np.asarray(programmes, dtype=np.intp), n)
+        found = scan(values, programme, np.zeros(values.shape[1]))
+        over = np.flatnonzero(found.log_evidence.max(axis=(1, 2)) > limit)
+        if len(over):
+            return int(over[0]) + 1
+    return None
 
 
 def threshold(mean_units: float | Array, streams: int) -> Array:

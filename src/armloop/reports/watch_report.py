@@ -23,7 +23,7 @@ from armloop.util.errors import InputError
 from armloop.watch import Options, Outcome
 from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.store import Store
-from armloop.watch.verdicts import Tested, examine, too_few, whole_history
+from armloop.watch.verdicts import Tested, examine, whole_history
 
 _SHOWN, _STREAMS = 4, 60
 
@@ -109,7 +109,11 @@ def _heat(outcome: Outcome) -> Section:
 
 def _overview(outcome: Outcome) -> Section:
     if not outcome.alarms:
-        young = [arm["arm"] for arm in outcome.arms if too_few(arm["units"], arm["limit"])]
+        young = [
+            arm["arm"]
+            for arm in outcome.arms
+            if arm["units_for_alarm"] is None or arm["units_since_alarm"] < arm["units_for_alarm"]
+        ]
         if len(young) == len(outcome.arms):
             return Section("Alarms", ["Of no arm there is enough operation yet for an alarm."])
         but = (

@@ -278,6 +278,11 @@ class WatchedArmData(Struct):
     arm: Name
     logs: Count
     units: Count
+    units_since_alarm: Count
+    units_for_alarm: (
+        Annotated[Count, Meta(description="fewest units since the last alarm after which there can be one")]
+        | None
+    )
     hours: _Hours
     limit: Finite
     warmth: Name | None

@@ -50,7 +50,18 @@ class Outcome:
             "arms": [
                 {
                     key: arm[key]
-                    for key in ("arm", "logs", "units", "hours", "limit", "warmth", "alarms", "notes")
+                    for key in (
+                        "arm",
+                        "logs",
+                        "units",
+                        "units_since_alarm",
+                        "units_for_alarm",
+                        "hours",
+                        "limit",
+                        "warmth",
+                        "alarms",
+                        "notes",
+                    )
                 }
                 for arm in self.arms
             ],

@@ -17,13 +17,14 @@ from armloop.model import ReconstructedModel
 from armloop.monitoring.alarms import Alarm, Watched, find_alarms
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Named, Normal, later_part, name_change
-from armloop.monitoring.ranks import HORIZON, soonest, threshold
+from armloop.monitoring.ranks import HORIZON, threshold
 from armloop.monitoring.serial import serial_correlation
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
 from armloop.monitoring.warmth import Adjusted, adjust, warms, without_warmth
 from armloop.util.arrays import Array
 from armloop.util.finite import finite
+from armloop.watch.attainable import attainable
 from armloop.watch.diagnosed import diagnose_alarms
 from armloop.watch.fleet import model_and_digest
 from armloop.watch.history import Head, History
@@ -154,12 +155,6 @@ def _notes(values: Array, programme: NDArray[np.intp]) -> tuple[str, ...]:
     )
 
 
-def too_few(units: int, limit: float) -> list[str]:
-    """What to say of so few units that no change could have brought the evidence above a limit (log) yet."""
-    fewest = soonest(limit) if np.isfinite(limit) else units
-    return [f"an alarm takes {fewest} units of operation, there are {units}"] if units < fewest else []
-
-
 def test_arm(task: Task) -> dict[str, Any]:
     """Test an arm's new logs, name what each new alarm is, and keep both; what was tested before is not again."""
     store = Store(task.store)
@@ -193,12 +188,15 @@ def _test(
         past = _advance(task, store, model, past, new)
     assert past.history is not None and past.most is not None
     listed = streams(past.history.units.columns, past.history.units.rows.shape[1])
+    able = attainable(past, task.options.healthy)
     answer = {
         "mark": mark,
         "arm": task.arm,
         "model": digest,
         "logs": len(past.seen),
         "units": past.count,
+        "units_since_alarm": able.there,
+        "units_for_alarm": able.needed,
         "hours": past.seconds / 3600.0,
         "first": float(past.history.units.when[0]),
         "last": float(past.history.units.when[-1]),
@@ -206,7 +204,7 @@ def _test(
         "warmth": past.known,
         "evidence": _by_place(listed, past.most),
         "alarms": list(past.alarms),
-        "notes": [*past.notes, *too_few(past.count, past.limit)],
+        "notes": [*past.notes, *able.notes()],
     }
     if heads:
         past.save(store, task.arm)
