@@ -7,6 +7,7 @@ import pytest
 from operation import Change, healthy_model, operate
 
 from armloop.model import ReconstructedModel
+from armloop.monitoring import sums as summing
 from armloop.monitoring.catalogue import Column, watched
 from armloop.monitoring.naming import Normal, name_change
 from armloop.monitoring.sums import LogSums, log_sums
@@ -174,3 +175,33 @@ def test_without_a_filter_blocks_have_the_times_and_temperatures_of_the_log(
     assert sums.seconds.sum() == pytest.approx(seconds, rel=0.05)
     middles = (sums.start + 0.5 * sums.seconds - late.time[0]) / seconds
     np.testing.assert_allclose(sums.temperature[:, 0], 20.0 + 20.0 * middles, atol=0.5)
+
+
+def test_columns_lie_in_memory_for_a_few_blocks_at_a_time(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the pieces, the sums are the same, across a gap and at their edges, where a delay looks back."""
+    log = operate(3, 0, None, 160.0)
+    log = log.select((log.time < 70.0) | (log.time > 75.0))
+    sizes: list[int] = []
+
+    def counted(*given: object) -> object:
+        known = summing_catalogue(*given)
+        sizes.append(len(known.values))
+        return known
+
+    summing_catalogue = summing.catalogue
+    monkeypatch.setattr(summing, "catalogue", counted)
+    monkeypatch.setattr(summing, "_PIECE", 1 << 30)
+    whole = log_sums(model, log)
+    (together,) = sizes
+    sizes.clear()
+    monkeypatch.setattr(summing, "_PIECE", together // 3)
+    parts = log_sums(model, log)
+    assert len(sizes) > 2 and max(sizes) < 0.45 * together
+    assert parts.columns == whole.columns
+    for name in ("start", "rows", "energy", "load"):
+        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+    for name in ("gram", "moment"):
+        a, b = getattr(parts, name), getattr(whole, name)
+        assert (np.abs(a - b) <= 1e-12 * np.abs(b).max(axis=0)).all(), name

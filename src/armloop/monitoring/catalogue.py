@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.laws.effects import Effect, effect, hypotheses
-from armloop.laws.effects.base import Place
+from armloop.laws.effects.base import Context, Place
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
 
@@ -113,13 +113,24 @@ def stays_nonlinear(e: Effect, coefficients: int) -> bool:
     return bool(np.abs(near - at).max() > 0.1 * np.abs(at).max())
 
 
-def catalogue(model: ReconstructedModel, samples: Samples, rows: NDArray[np.intp]) -> Catalogue:
-    """The columns of a run's samples ``rows`` (K,), in the order of :func:`watched`."""
-    motion, period = samples.motion, samples.period
+def known_context(model: ReconstructedModel, samples: Samples) -> Context:
+    """What the model says of all of a run's samples: their torque and the load on the joints, (N, n) each."""
+    return model.context(samples.motion, [e for e, _ in watched(model)])
+
+
+def catalogue(
+    model: ReconstructedModel, samples: Samples, rows: NDArray[np.intp], whole: Context | None = None
+) -> Catalogue:
+    """The columns of a run's samples ``rows`` (K,), in the order of :func:`watched`.
+
+    Args:
+        whole: :func:`known_context` where it is known already.
+    """
+    period = samples.period
     if samples.cutoff_hz > 0:
         period = max(period, 1 / INDEPENDENT / samples.cutoff_hz)
     effects = watched(model)
-    whole = model.context(motion, [e for e, _ in effects])
+    whole = whole or known_context(model, samples)
     assert whole.load is not None and whole.predicted is not None
     thin = replace(
         whole,

@@ -6,7 +6,7 @@ its blocks', and the samples are needed no more.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -18,7 +18,7 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, preprocess, smooth
 from armloop.model import ReconstructedModel
-from armloop.monitoring.catalogue import Column, catalogue
+from armloop.monitoring.catalogue import Column, catalogue, known_context
 from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 
@@ -26,6 +26,9 @@ from armloop.util.errors import LogError
 BLOCK_SECONDS = 30.0
 #: Fewer sliding samples than this say nothing of a joint.
 FEWEST_ROWS = 20
+#: Samples whose columns lie in memory together, for they are a hundred and more for each joint; and what is computed beside
+#: them, s, for a delay's column, up to a fifth of a second, looks so far back.
+_PIECE, _BESIDE = 4096, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +101,11 @@ def log_sums(
         raise LogError(
             f"{log.name}: no joint slides for {FEWEST_ROWS} samples; a log says something only where joints move"
         )
-    known = catalogue(model, samples, kept)
-    predicted = known.predicted if not model.effects else model.predict(motion)
+    whole = known_context(model, samples)
+    predicted = model.predict(motion) if model.effects else whole.predicted
+    assert predicted is not None and whole.load is not None
     scale = residual_scale(model, samples)
     u = (samples.tau - smooth(samples, predicted))[kept] / scale
-    x = known.values / scale[:, None]
     number = block_numbers(motion, BLOCK_SECONDS)
     present, block = np.unique(number[kept], return_inverse=True)
     edges = np.searchsorted(block, np.arange(len(present) + 1))
@@ -117,9 +120,19 @@ def log_sums(
         "lagged": u * following,
         "torque": (samples.tau[kept] / scale * count) ** 2,
         "speed": motion.v[kept] ** 2 * count,
-        "load": known.load**2 * count,
+        "load": whole.load[kept] ** 2 * count,
     }
-    normal = [joint_sums(x[a:b], u[a:b], slides[a:b]) for a, b in pairwise(edges.tolist())]
+    columns: tuple[Column, ...] = ()
+    normal: list[tuple[Array, Array]] = []
+    instants = motion.time[kept]
+    for blocks in _pieces(edges):
+        first, last = int(blocks[0]), int(blocks[-1])
+        low, high = np.searchsorted(instants, instants[[first, last - 1]] + [-_BESIDE, _BESIDE])
+        known = catalogue(model, samples, kept[low:high], whole)
+        columns, x = known.columns, known.values[first - low : last - low] / scale[:, None]
+        normal += [
+            joint_sums(x[a - first : b - first], u[a:b], slides[a:b]) for a, b in pairwise(blocks.tolist())
+        ]
     times = [motion.time[number == one] for one in present]
     near = np.clip(np.searchsorted(log.time, motion.time[kept]), 0, len(log.time) - 1)
 
@@ -130,7 +143,7 @@ def log_sums(
         return np.add.reduceat(rows, edges[:-1]) / np.diff(edges)[:, None]
 
     return LogSums(
-        columns=known.columns,
+        columns=columns,
         start=np.array([t[0] for t in times]),
         seconds=np.array([t[-1] - t[0] for t in times]),
         gram=np.array([gram for gram, _ in normal]),
@@ -139,6 +152,15 @@ def log_sums(
         since_start=mean("since_start", 1)[:, 0],
         **{name: np.add.reduceat(values, edges[:-1]) for name, values in each.items()},
     )
+
+
+def _pieces(edges: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+    """The edges of blocks (B + 1,), as many blocks at a time as have no more than :data:`_PIECE` samples, at least one."""
+    at = 0
+    while at < len(edges) - 1:
+        end = max(at + 1, int(np.searchsorted(edges, edges[at] + _PIECE, side="right")) - 1)
+        yield edges[at : end + 1]
+        at = end
 
 
 def joint_sums(x: Array, u: Array, slides: NDArray[np.bool_]) -> tuple[Array, Array]:
