@@ -147,7 +147,7 @@ def catalogue(
             values = values @ e.embed(e.start(np.zeros(values.shape[2])))[1]
         columns += [Column(*e.place, k, shape) for k in range(values.shape[2])]
         parts.append(values)
-    return Catalogue(tuple(columns), np.concatenate(parts, axis=2), whole.load[rows], whole.predicted)
+    return Catalogue(tuple(columns), np.concatenate(parts, axis=2), whole.predicted)
 
 
 def motion_of(samples: Samples, rows: NDArray[np.intp]) -> Motion:
@@ -160,11 +160,10 @@ def motion_of(samples: Samples, rows: NDArray[np.intp]) -> Motion:
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """Columns (K, n, p) with what each is, the load (K, n) on the joints, and the prediction (N, n) of all samples."""
+    """Columns (K, n, p) with what each is, and the prediction (N, n) of all samples."""
 
     columns: tuple[Column, ...]
     values: Array
-    load: Array
     predicted: Array
 
 

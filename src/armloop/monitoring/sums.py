@@ -6,8 +6,8 @@ its blocks', and the samples are needed no more.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -63,6 +63,19 @@ class LogSums:
     temperature: Array
     since_start: Array
 
+    @staticmethod
+    def joined(parts: Sequence[LogSums]) -> LogSums:
+        """Those of pieces of one log, in order (at least one), with all their blocks."""
+        first, *_ = parts
+        names = [each.name for each in fields(LogSums) if each.name != "columns"]
+        return LogSums(
+            first.columns, *(np.concatenate([getattr(part, name) for part in parts]) for name in names)
+        )
+
+
+class RestingError(LogError):
+    """Nothing slides for long enough."""
+
 
 def residual_scale(model: ReconstructedModel, samples: Samples | None = None) -> Array:
     """(n,) RMSE that the model leaves on held-out data of its own training runs; a hundredth of the torque without it."""
@@ -86,7 +99,8 @@ def log_sums(
         extra: further columns of the log, (N,) or (N, n) each: ``temperature`` °C, ``since_start`` s.
 
     Raises:
-        LogError: the log is not of the model's arm, too short for the filter, or no joint slides long enough.
+        LogError: the log is not of the model's arm, too short for the filter (:class:`ShortRunError`), or no joint slides
+            long enough (:class:`RestingError`).
     """
     n = model.arm.n
     if log.joints != n:
@@ -98,7 +112,7 @@ def log_sums(
     kept = np.flatnonzero(independent_rows(samples))[::2]
     slides = samples.moving[kept]
     if not (slides.sum(axis=0) >= FEWEST_ROWS).any():
-        raise LogError(
+        raise RestingError(
             f"{log.name}: no joint slides for {FEWEST_ROWS} samples; a log says something only where joints move"
         )
     whole = known_context(model, samples)

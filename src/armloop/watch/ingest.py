@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from armloop.monitoring.sums import log_sums
+from armloop.data.signals import ShortRunError
+from armloop.model import ReconstructedModel
+from armloop.monitoring.sums import LogSums, RestingError, log_sums
 from armloop.regression.moments import Sums
 from armloop.util.doubts import warn
-from armloop.util.errors import InputError
+from armloop.util.errors import InputError, LogError
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Workers
 from armloop.watch.fleet import model_and_digest, model_for
-from armloop.watch.sources import LogFile, arm_in, day_of, read_recording
+from armloop.watch.sources import LogFile, arm_in, day_of, recordings
 from armloop.watch.store import Store
 
 #: Logs of one arm that a worker takes at a time, in order.
@@ -140,13 +142,32 @@ def read_piece(piece: Piece) -> Counts:
     model, digest = model_and_digest(piece.model)
     for file, log in piece.files:
         try:
-            recording = read_recording(file, model)
-            sums = log_sums(model, recording.log, recording.extra)
+            sums, when = _sums(file, model)
         except InputError as error:
             store.set_aside(log, digest, {"arm": piece.arm, "log": str(file.path), "reason": str(error)})
             counts += Counts(aside=1)
             continue
-        about = {"name": file.path.stem, "programme": file.programme, "when": recording.when}
-        store.add(piece.arm, day_of(recording.when), log, digest, sums, about)
+        about = {"name": file.path.stem, "programme": file.programme, "when": when}
+        store.add(piece.arm, day_of(when), log, digest, sums, about)
         counts += Counts(read=1)
     return counts
+
+
+def _sums(file: LogFile, model: ReconstructedModel) -> tuple[LogSums, float]:
+    """The sums of a log, and when it began; a long one is read in pieces, of which some may be of an arm at rest.
+
+    Raises:
+        LogError: it cannot be used.
+    """
+    parts: list[LogSums] = []
+    began: list[float] = []
+    resting: LogError | None = None
+    for recording in recordings(file, model):
+        began.append(recording.when)
+        try:
+            parts.append(log_sums(model, recording.log, recording.extra))
+        except (RestingError, ShortRunError) as error:
+            resting = resting or error
+    if not parts and resting is not None:
+        raise resting
+    return LogSums.joined(parts), began[0]

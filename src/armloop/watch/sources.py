@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from armloop.data.log import MotionLog, read_log
+from armloop.data.pieces import log_sources
 from armloop.data.tables import CSV, PARQUET, kind_of, read_columns, read_header
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
@@ -163,23 +164,31 @@ def read_recording(file: LogFile, model: ReconstructedModel) -> Recording:
     return Recording(log, _extra(file.path, model.arm.n), recorded_at(file, float(log.time[0])))
 
 
-def _extra(path: Path, n: int) -> dict[str, Array]:
+def recordings(file: LogFile, model: ReconstructedModel) -> Iterator[Recording]:
+    """The same piece by piece, where a log is too long to lie in memory (out-of-core)."""
+    for piece in log_sources([file.path], model.arm.n, model.recorded):
+        log = piece.read()
+        extra = _extra(file.path, model.arm.n, piece.rows)
+        yield Recording(log, extra, recorded_at(file, float(log.time[0])))
+
+
+def _extra(path: Path, n: int, rows: tuple[int, int] | None = None) -> dict[str, Array]:
     header = read_header(path)
     extra: dict[str, Array] = {}
     numbered = [f"temperature{j}" for j in range(1, n + 1)]
     named = [name for name in header if _TEMPERATURES.fullmatch(name)]
     if set(numbered) <= set(header):
-        table = read_columns(path, numbered)
+        table = read_columns(path, numbered, rows)
         extra["temperature"] = np.column_stack([table[name] for name in numbered])
     elif "temperature" in header:
-        extra["temperature"] = read_columns(path, ["temperature"])["temperature"]
+        extra["temperature"] = read_columns(path, ["temperature"], rows)["temperature"]
     elif named:
         raise LogError(
             f"{path}: {', '.join(named)} stand alone; give temperature, or one column for each joint"
         )
     for name in _SINCE:
         if name in header:
-            extra["since_start"] = read_columns(path, [name])[name]
+            extra["since_start"] = read_columns(path, [name], rows)[name]
             break
     return extra
 
