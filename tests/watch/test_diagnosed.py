@@ -77,7 +77,8 @@ def test_an_alarm_of_sums_alone_is_diagnosed_when_it_is_asked_for(
     assert "diagnosis" not in capsys.readouterr().out
     assert main(call) == 0
     said = capsys.readouterr().out
-    assert "no new alarm; 1 told before" in said and "diagnosed now:" in said and "effects found" in said
+    assert "told before (1): loaded: payload since 2026-01-03" in said
+    assert "diagnosed now:" in said and "effects found" in said
     (alarm,) = Store(store).alarms()
     assert alarm["diagnosis"]["effects"][0]["effect"] == "payload"
     before = contents(store)

@@ -206,6 +206,54 @@ def test_broken_and_foreign_logs_are_set_aside_with_their_reason(fleet: Path, tm
     assert (again.counts.read, len(again.aside)) == (1, 2)
 
 
+def test_a_log_that_was_broken_is_no_longer_aside_once_it_is_whole_or_gone(
+    fleet: Path, tmp_path: Path
+) -> None:
+    """A log that is still being written is broken; of one whose folder is not mounted nothing is known."""
+    logs, good = tmp_path / "logs" / "healthy", sorted((fleet / "logs" / "healthy").iterdir())[0]
+    logs.mkdir(parents=True)
+    for k, name in enumerate(("writing", "deleted", "stays")):
+        (logs / f"{name}.parquet").write_bytes(good.read_bytes()[: 900 + k])
+
+    def aside() -> set[str]:
+        found = watch(
+            fleet / "models", find_logs([logs.parent]), tmp_path / "store", Options(full=False)
+        ).aside
+        assert {item["arm"] for item in found} == {"healthy"}  # though nothing can be read of it
+        return {Path(item["log"]).stem for item in found}
+
+    assert aside() == {"writing", "deleted", "stays"}
+    shutil.copy(good, logs / "writing.parquet")
+    (logs / "deleted.parquet").unlink()
+    assert aside() == {"stays"}
+    logs.rename(tmp_path / "unmounted")
+    assert aside() == {"stays"}
+
+
+def test_that_there_is_no_log_is_said(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], watched: Path
+) -> None:
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    call = ["watch", "--models", str(fleet / "models"), "--logs", str(empty), "--sums-only", "--store"]
+    assert main([*call, str(tmp_path / "store")]) == 2
+    said = capsys.readouterr().err
+    assert f"{empty}: holds no log" in said and said.count("\n") == 1
+    assert not (tmp_path / "store").exists()
+    assert main([*call, str(watched)]) == 0  # what was read may have been put away
+    assert f"warning: {empty}: holds no log" in capsys.readouterr().err
+
+
+def test_recordings_of_other_formats_are_not_passed_over_in_silence(tmp_path: Path) -> None:
+    arm = tmp_path / "logs" / "arm7"
+    arm.mkdir(parents=True)
+    for name in ("a.csv", "b.mcap", "c.csv.gz", "notes.txt", ".hidden.mcap"):
+        (arm / name).touch()
+    with pytest.warns(InputWarning, match=r"2 files passed over .* such as .*b\.mcap; `armloop convert`"):
+        (found,) = find_logs([tmp_path / "logs"])
+    assert found.path.name == "a.csv"
+
+
 def test_a_link_to_a_log_that_is_gone_is_said(fleet: Path, tmp_path: Path) -> None:
     logs = tmp_path / "logs" / "healthy"
     logs.mkdir(parents=True)

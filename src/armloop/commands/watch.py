@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from armloop.commands.arguments import Json, processes
 from armloop.commands.options import flag, option, required, whole
 from armloop.util.errors import InputError
 from armloop.util.outputs import take_file
+
+if TYPE_CHECKING:
+    from armloop.watch.sources import LogFile
 
 HELP = "watch many logs of many arms over time: alarms with a stated false alarm rate, then a diagnosis"
 EXAMPLE = "armloop watch --models models --logs logs --store store --report watch.html"
@@ -69,7 +72,6 @@ def run(options: Watch) -> int:
     from armloop.util.files import write_text
     from armloop.watch import Options, watch
     from armloop.watch.ingest import Counts
-    from armloop.watch.sources import find_logs
 
     if options.arm is not None and options.report is None:
         raise InputError("--arm chooses whose trends the page of --report shows: give it, too")
@@ -82,7 +84,7 @@ def run(options: Watch) -> int:
     diagnosed: list[str] = []
     outcome, counts = None, Counts()
     for places in _batches(sys.stdin) if options.logs == ["-"] else [options.logs]:
-        outcome = watch(options.models, find_logs(places), options.store, how, tell)
+        outcome = watch(options.models, _found(places, options.store), options.store, how, tell)
         if not options.json:
             from armloop.reports.watch_tables import watch_words
 
@@ -110,6 +112,26 @@ def run(options: Watch) -> int:
             f"{options.store}"
         )
     return NEW_ALARM if told else 0
+
+
+def _found(places: Sequence[str], store: str) -> list[LogFile]:
+    """The logs in these places; that there are none is said: to a job that looks at the status alone, all would be well.
+
+    Raises:
+        InputError: there are none, and the store has none, either.
+    """
+    from pathlib import Path
+
+    from armloop.util.doubts import warn
+    from armloop.watch.sources import find_logs
+
+    files = find_logs(places)
+    if not files:
+        said = f"{', '.join(places)}: holds no log; --logs takes DIR/ARM/*.csv or *.parquet"
+        if not any(Path(store).glob("sums/*/*/*.parquet")):
+            raise InputError(said)
+        warn(said)
+    return files
 
 
 def _announce(store: str, names: Sequence[str]) -> None:

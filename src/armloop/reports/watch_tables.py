@@ -56,6 +56,10 @@ def alarm_words(alarm: dict[str, Any]) -> list[str]:
     return Prose("watch", alarm=alarm).paragraphs("meaning")
 
 
+def _aside(item: dict[str, Any]) -> str:
+    return f"{item['arm']}: {item['reason']}" if item["arm"] else str(item["reason"])
+
+
 def watch_words(outcome: Outcome) -> str:
     """The whole answer for a terminal."""
     counts = outcome.counts
@@ -70,7 +74,13 @@ def watch_words(outcome: Outcome) -> str:
             lines.append(f"\n{alarm['arm']}:")
             lines += [wrapped(text, "  ") for text in alarm_words(alarm)]
     else:
-        lines.append("no new alarm" + (f"; {len(outcome.alarms)} told before" if outcome.alarms else ""))
+        lines.append("no new alarm")
+    before = [alarm for alarm in reversed(outcome.alarms) if alarm["id"] not in outcome.new]
+    if before:
+        newest = "; ".join(
+            f"{alarm['arm']}: {named(alarm)} since {moment(alarm['since'])}" for alarm in before[:3]
+        )
+        lines.append(wrapped(f"told before ({len(before)}): {newest}{'; …' if len(before) > 3 else ''}"))
     for alarm in outcome.alarms:
         if alarm["id"] in outcome.diagnosed:
             lines.append(f"\n{alarm['arm']}, alarm of {moment(alarm['when'])}, diagnosed now:")
@@ -82,9 +92,10 @@ def watch_words(outcome: Outcome) -> str:
         if len(notes) > _LISTED:
             lines.append(f"… and {len(notes) - _LISTED} more notes (--json, --report)")
     if outcome.aside:
-        lines.append("\n" + str(aside_table(outcome.aside[:_LISTED], "Set aside")))
+        lines.append("\nSet aside:")
+        lines += [wrapped(_aside(item), "  ") for item in outcome.aside[:_LISTED]]
         if len(outcome.aside) > _LISTED:
-            lines.append(f"… and {len(outcome.aside) - _LISTED} more (STORE/aside)")
+            lines.append(f"… and {len(outcome.aside) - _LISTED} more (--json, --report)")
     lines.append(
         f"\npromise: a mean time of at least {outcome.hours:g} h of operation between false alarms of one whole arm"
     )

@@ -74,7 +74,7 @@ def ingest(
         try:
             arm, programme = _whose(file, models)
         except InputError as error:
-            counts += _put_aside(store, aside, digest, file, "", str(error))
+            counts += _put_aside(store, aside, digest, file, file.arm, str(error))
             continue
         path = model_for(models, arm) if arm else None
         if path is None:
@@ -98,6 +98,7 @@ def ingest(
         counts += answer
         done += answer.read + answer.aside
         tell(f"read {done} of {total} new logs")
+    store.prune_aside({str(path): digest for digest, path in places.items()})
     return counts, places
 
 

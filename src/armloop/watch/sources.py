@@ -17,6 +17,7 @@ from armloop.data.pieces import log_sources
 from armloop.data.tables import CSV, PARQUET, kind_of, read_columns, read_header
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
+from armloop.util.doubts import warn
 from armloop.util.errors import InputError, LogError
 
 _DATE = re.compile(
@@ -26,6 +27,8 @@ _DATE = re.compile(
 _TIME = re.compile(r"(?<!\d)([01]\d|2[0-3])([-_.:hH]?)([0-5]\d)(?:\2|[mM])([0-5]\d)(?!\d)")
 #: A clock that shows more than this counts seconds since 1970 (2001-09-09), not since the log began.
 _EPOCH = 1e9
+#: Files that hold recordings, but of which logs must be made first.
+_OTHERS = frozenset({".bag", ".db3", ".mcap", ".mat", ".npz", ".tsv", ".bz2", ".gz", ".xz", ".zip", ".zst"})
 _TEMPERATURES = re.compile(r"temperature(\d{0,3})")
 _SINCE = ("since_start", "time_since_start")
 
@@ -71,13 +74,23 @@ class Recording:
 def find_logs(places: Sequence[str | Path]) -> list[LogFile]:
     """The logs in folders, DIR/ARM/[PROGRAMME/]FILE, and single files, whose arm is their folder; sorted by path.
 
+    Recordings of other formats in the folders are passed over, and that is said: an arm whose recorder was changed must
+    not look like one that is well.
+
     Raises:
         InputError: a place does not exist.
     """
     found: dict[Path, LogFile] = {}
     for place in map(Path, places):
         if place.is_dir():
-            for path in _below(place):
+            logs, others = _below(place)
+            if others:
+                count = f"{len(others)} file{'s' * (len(others) != 1)}"
+                warn(
+                    f"{place}: {count} passed over that are no {CSV} or {PARQUET}, such as {min(others)}; `armloop convert` "
+                    "makes logs of ROS bags, .mat, .npz and tables, what is compressed must be unpacked"
+                )
+            for path in logs:
                 inside = path.relative_to(place).parts[:-1]
                 arm = inside[0] if inside else ""
                 found[path] = LogFile(
@@ -93,9 +106,14 @@ def find_logs(places: Sequence[str | Path]) -> list[LogFile]:
     return [found[path] for path in sorted(found)]
 
 
-def _below(place: Path) -> Iterator[Path]:
-    """Logs below a folder, links to folders followed, each folder once; a link to nothing is there, to be told."""
+def _below(place: Path) -> tuple[list[Path], list[Path]]:
+    """Logs below a folder, and recordings that are none; links to folders are followed, each folder once.
+
+    A link to nothing is there, to be told.
+    """
     seen: set[str] = set()
+    logs: list[Path] = []
+    others: list[Path] = []
     for folder, inside, names in os.walk(place, followlinks=True):
         inside.sort()
         real = os.path.realpath(folder)
@@ -103,11 +121,13 @@ def _below(place: Path) -> Iterator[Path]:
             inside.clear()
             continue
         seen.add(real)
-        for name in names:
-            path = Path(folder, name)
-            log = kind_of(path) in (CSV, PARQUET) and not name.startswith(".")
-            if log and (path.is_file() or not path.exists()):
-                yield path
+        for path in (Path(folder, name) for name in names if not name.startswith(".")):
+            if kind_of(path) in (CSV, PARQUET):
+                if path.is_file() or not path.exists():
+                    logs.append(path)
+            elif kind_of(path) in _OTHERS:
+                others.append(path)
+    return logs, others
 
 
 def _programme(folders: Sequence[str]) -> str:

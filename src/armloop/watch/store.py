@@ -19,7 +19,7 @@ import json
 import os
 import secrets
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -130,6 +130,20 @@ class Store:
         """What was set aside, in the order of the names."""
         found = [_read_json(path) for path in sorted(self.folder.glob("aside/*.json"))]
         return sorted(found, key=lambda item: (item["arm"], item["log"]))
+
+    def prune_aside(self, present: Mapping[str, str]) -> None:
+        """Forget the logs set aside whose file holds something else by now (it was still being written) or is gone.
+
+        Args:
+            present: digests of the logs that there are, by their paths.
+        """
+        here = set(present.values())
+        for path in self.folder.glob("aside/*.json"):
+            log, place = digests(path)[0], Path(_read_json(path)["log"])
+            # a folder that is not there may be mounted again
+            gone = not place.exists() and place.parent.is_dir()
+            if log not in here and (gone or str(place) in present):
+                path.unlink(missing_ok=True)
 
     # -- arms -------------------------------------------------------------------------------------------------------
 
