@@ -2,14 +2,19 @@
 
 import json
 import shutil
+from functools import partial
 from pathlib import Path
 
 import pytest
 from answers import answered
-from operation import contents
+from operation import contents, operate
 
 from armloop.cli import main
-from armloop.watch import Options, Outcome, watch
+from armloop.data import pieces
+from armloop.data.log import MotionLog, write_log
+from armloop.model import ReconstructedModel, load_model
+from armloop.watch import Options, Outcome, sources, watch
+from armloop.watch.diagnosed import diagnose_alarms
 from armloop.watch.sources import LogFile, find_logs
 from armloop.watch.store import Store
 
@@ -86,6 +91,40 @@ def test_an_alarm_of_sums_alone_is_diagnosed_when_it_is_asked_for(
         assert main([*call, "--json", *more]) == 0
         assert answered(capsys.readouterr().out, "watch")["diagnosed"] == []
     assert contents(store) == before
+
+
+@pytest.mark.parametrize("piece", [1 << 30, 7200])
+def test_of_a_long_log_what_comes_before_the_alarm_is_diagnosed(
+    models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, piece: int
+) -> None:
+    """The last 150 s, also where the log is read in pieces (of 120 s, here)."""
+    monkeypatch.setattr(pieces, "PIECE", piece)
+    monkeypatch.setattr(sources, "log_sources", partial(pieces.log_sources, in_memory=piece))
+    taken: list[tuple[float, float]] = []
+
+    class Answer:
+        def to_dict(self) -> dict[str, str]:
+            return {"verdict": "stands for one"}
+
+    def spied(model: ReconstructedModel, logs: list[MotionLog], jobs: int) -> Answer:
+        taken.append((float(logs[0].time[0]), float(logs[0].time[-1])))
+        return Answer()
+
+    monkeypatch.setattr("armloop.watch.diagnosed.diagnose", spied)
+    write_log(tmp_path / "long.parquet", operate(5, 0, None, 600.0))
+    store = Store(tmp_path / "store")
+    for name, into in (("a", 420.0), ("b", 599.0)):
+        store.add_alarm("loaded", name, {"window": ["log"], "into_log": into})
+    diagnose_alarms(
+        store,
+        "loaded",
+        load_model(models / "loaded.json"),
+        ["a", "b"],
+        {"log": tmp_path / "long.parquet"},
+    )
+    for (first, last), into in zip(taken, (420.0, 599.0), strict=True):
+        assert into - 150.1 <= first and last <= into + 1.1 and last - first > 60.0
+        assert last > into - 65.0  # whatever piece it is of, it is near
 
 
 def test_a_diagnosis_waits_for_logs(

@@ -269,6 +269,9 @@ class AlarmData(Struct):
     window: (
         Annotated[list[Name], Meta(description="digests of the logs that it was named from")] | UnsetType
     ) = UNSET
+    into_log: Annotated[Finite, Meta(description="s of the last of these up to the alarm")] | UnsetType = (
+        UNSET
+    )
     diagnosis: dict[str, Any] | UnsetType = UNSET
 
 

@@ -378,6 +378,7 @@ def _explain(
         "course": _course(tested, max(alarm.from_unit, alarm.since - HORIZON), alarm.unit, column),
         "notes": list(tested.notes),
         "window": [history.logs[log].log for log in logs],
+        "into_log": float(units.when[at] + units.seconds[at] - history.logs[units.log[at]].when),
     }
     return answer, column
 
