@@ -130,8 +130,10 @@ def test_it_may_begin_and_end_wherever_nothing_tells_of_it(
     evidence: Any = SimpleNamespace(samples=samples)
     tells = np.ones(300, dtype=bool)
     tells[slice(*silent)] = False
-    found = pushes._edge_errors(evidence, slice(140, 180), tells)
-    assert found == pytest.approx([np.hypot(0.03, beside / np.sqrt(3)) for beside in (start, end)])
+    for rise in (0.0, 0.15):
+        found = pushes._edge_errors(evidence, slice(140, 180), tells, rise)
+        expected = [np.hypot(0.03, max(beside, rise) / np.sqrt(3)) for beside in (start, end)]
+        assert found == pytest.approx(expected)
 
 
 class TestTrialOfAPush:
@@ -206,7 +208,7 @@ class TestTrialOfAPush:
     ) -> None:
         """A force of f N upwards at the tool is 0.75 f N·m of joint 2 and 0.35 f of joint 3, which shows nothing."""
         monkeypatch.setattr(
-            pushes, "_FEW", 2
+            pushes, "FEW", 2
         )  # so that a force is what an arm of three joints feels above all
         monkeypatch.setattr(pushes, "MOSTLY", 0.6)
         monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)

@@ -121,6 +121,8 @@ class TestParameters:
         )
         columns = kind.columns(evidence, given)
         residual = columns @ np.full(columns.shape[2], 2.0) * of.get("size", 1.0)
+        inside = (np.arange(samples) >= 10) & (np.arange(samples) < of.get("end", 30))
+        residual *= of.get("profile", inside)[:, None]
         weight = np.ones((samples, arm.n))
         weight[of.get("silent", slice(0)), 0] = 0.0
         burst = slice(7, of.get("end", 30))
@@ -147,6 +149,19 @@ class TestParameters:
             found.added.parameters["torque"].unit == "N*m" and found.added.parameters["posture"].unit == "rad"
         )
         assert found.added.parameters["start"].std_error == pytest.approx(0.15)
+
+    def test_what_comes_and_goes_smoothly_may_have_begun_while_it_rose(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Of a raised cosine from 0.005 to 0.385 s the stretch from half of its height on is stated."""
+        off = (np.arange(40) * 0.01 - 0.195) / 0.19
+        smooth = np.where(np.abs(off) < 1, np.cos(np.pi * off / 2) ** 2, 0.0)
+        kind = pushes._Kind(effect("external_torque", 1))
+        for profile, rise in ((smooth, 0.095), ((np.abs(off) < 0.5) * 1.0, 0.0)):
+            found = self.trial(monkeypatch, kind, three_axis(), profile=profile).added.parameters
+            assert (found["start"].value, found["end"].value) == pytest.approx((0.1, 0.29))
+            for edge in ("start", "end"):
+                assert found[edge].std_error == pytest.approx(np.hypot(0.01, rise / np.sqrt(3)))
 
     @pytest.mark.parametrize("link", [0, 3])
     def test_a_force_has_its_link_unless_that_is_the_tool(

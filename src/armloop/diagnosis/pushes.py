@@ -16,7 +16,7 @@ from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
-from armloop.util.arrays import Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3
@@ -170,7 +170,7 @@ def _trial(
     joints = evidence.model.arm.joints
     unit = joints[0].position_unit if len({j.position_unit for j in joints}) == 1 else "rad or m"
     tells = np.asarray(weight[:, columns.any(axis=(0, 2))].any(axis=1))
-    errors = _edge_errors(evidence, burst, tells)
+    errors = _edge_errors(evidence, burst, tells, _rise(evidence, residual, weight, burst, kind))
     parameters = interval(float(part.time[0]), float(part.time[-1]), errors, part.q[0], unit)
     if kind.effect.joint is not None:
         torque = joints[kind.effect.joint - 1].torque_unit
@@ -242,13 +242,32 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
     return slice(near.start + start, near.start + end) if end - start >= 4 else burst
 
 
-def _edge_errors(evidence: Evidence, burst: slice, tells: Mask) -> tuple[float, float]:
+def _rise(evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind) -> float:
+    """Half the rise time of an event, s: so long before its stretch, from half of its height on, it may have begun.
+
+    That of a raised cosine as wide at half its height, where this explains more of the samples around than a rectangle.
+    """
+    time, run = evidence.samples.motion.time, evidence.samples.motion.run_of(burst.start)
+    half = (burst.stop - burst.start) // 2
+    near = slice(max(run.start, burst.start - half), min(run.stop, burst.stop + half))
+    start, end = float(time[burst.start]), float(time[burst.stop - 1])
+    off = (time[near] - (start + end) / 2) / max(end - start, TINY)
+    _, columns, y = _burst(evidence, residual, weight, near, kind)
+    left = []
+    for profile in (np.abs(off) <= 0.5, np.where(np.abs(off) < 1, np.cos(np.pi * off / 2) ** 2, 0.0)):
+        X = columns * profile[:, None, None]
+        left.append(float(((y - X @ _size(X, y)) ** 2).sum()))
+    return 0.5 * (end - start) if left[1] < left[0] else 0.0
+
+
+def _edge_errors(evidence: Evidence, burst: slice, tells: Mask, rise: float) -> tuple[float, float]:
     """Standard errors of an event's start and end, s: the filter's reach, and the samples beside it that tell nothing of it.
 
-    It may have begun, or ended, at any of those as likely: the root mean square of a uniform distribution.
+    It may have begun, or ended, at any of those as likely, or while it rose: the root mean square of a uniform distribution.
 
     Args:
         tells: (N,) samples in which a joint that feels it counts.
+        rise: how long it may have risen before, and fallen after, s.
     """
     motion = evidence.samples.motion
     run = motion.run_of(burst.start)
@@ -258,7 +277,7 @@ def _edge_errors(evidence: Evidence, burst: slice, tells: Mask) -> tuple[float, 
     last = burst.stop + (int(after[0]) if len(after) else run.stop - burst.stop) - 1
     edge = max(evidence.samples.period, 1.5 * evidence.samples.reach)
     silent = motion.time[burst.start] - motion.time[first], motion.time[last] - motion.time[burst.stop - 1]
-    start, end = (float(np.hypot(edge, beside / np.sqrt(3))) for beside in silent)
+    start, end = (float(np.hypot(edge, max(beside, rise) / np.sqrt(3))) for beside in silent)
     return start, end
 
 
