@@ -103,11 +103,16 @@ def test_an_event_is_told_from_a_law_where_a_joint_leaves_twice_what_it_leaves_a
     left[:20] = 9.0
     evidence: Any = SimpleNamespace(rows=outside, scale=np.array([0.1, 1.0]), residual=lambda known: left)
 
-    def told(before: float, *shown: int) -> bool:
+    def told(before: float, *shown: int, laws: Any = ()) -> bool:
         contact: Any = SimpleNamespace(shown=frozenset(shown), before=np.array([before, 2.0]))
-        return contacts.told(whole, evidence, contact)
+        return contacts.told(whole, evidence, contact, laws)
 
     assert told(0.601, 0) and not told(0.599, 0)
+    # nor from a law of its joints, or of the arm, that explains as much
+    assert not told(0.601, 0, laws=[effect("joint_spring", 1)]) and told(
+        0.601, 0, laws=[effect("joint_spring", 2)]
+    )
+    assert not told(0.601, 0, laws=[effect("payload", None)])
     assert told(0.0, 1) and told(0.0, 0, 1)
     left[20:, 1] = 1.01
     assert not told(0.0, 1)

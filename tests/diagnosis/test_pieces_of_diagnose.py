@@ -81,8 +81,10 @@ class Answers:
             "account_with_load": self.loaded,
             "outweighed": lambda *_: None,
             "drowned": lambda *_: False,
-            "told": lambda whole, evidence, contact: (
-                (whole.name, evidence.name) == ("whole", "left") and not self.given.get("untold")
+            "laws_instead": lambda whole, contacts, panel, progress: self.note("laws", panel, ["law"]),
+            "told": lambda whole, evidence, contact, laws: (
+                (whole.name, evidence.name, laws) == ("whole", "left", ["law"])
+                and not self.given.get("untold")
             ),
             "event_untold": lambda event: f"not told: {event}",
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),

@@ -9,6 +9,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import fit
 from armloop.diagnosis.judgement import (
     CHANCE,
     MOST,
@@ -21,8 +22,9 @@ from armloop.diagnosis.judgement import (
 )
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import Outcome, search, without_effects_at
-from armloop.diagnosis.trials import Hypotheses
+from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.laws.effects import Effect
 from armloop.laws.effects.base import number
 from armloop.laws.effects.found import RANGE
 from armloop.laws.effects.time_delay import TimeDelay
@@ -156,6 +158,19 @@ class Account:
         before = (residual / evidence.scale)[evidence.rows & bursts[:, None]]
         after = held_out[bursts[evidence.stacking[0]]]
         return 1 - float((after**2).sum()) / max(float((before**2).sum()), TINY)
+
+
+def laws_instead(
+    whole: Evidence, contacts: list[Contact], panel: Hypotheses, progress: Progress
+) -> list[Effect]:
+    """Listed laws each of which leaves no more of a run, on blocks that it was not fitted on, than all of its events do."""
+    if not contacts or not whole.rows.any():
+        return []
+    evidence = without(whole, contacts)
+    nothing = fit(evidence, evidence.residual([]), [], [])
+    account = Account(whole, contacts, evidence, Outcome([], nothing, nothing), None)
+    least = account.left(whole.residual([]))
+    return [trial.effect for trial in panel.tried(Known.of(whole), progress) if trial.score.error <= least]
 
 
 def slid_since(motion: Motion, moving: Mask, seconds: float) -> Mask:

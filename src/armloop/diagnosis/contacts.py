@@ -20,6 +20,7 @@ from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import FEW, FREEDOM, PAUSE, SHORTEST, Contact, around, push
+from armloop.laws.effects import Effect
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import TINY, Array, Index, Mask
@@ -376,16 +377,19 @@ def without(evidence: Evidence, contacts: list[Contact]) -> Evidence:
     return evidence.only(rows)
 
 
-def told(whole: Evidence, evidence: Evidence, contact: Contact) -> bool:
-    """Whether an event can be told from a law of the motion without a search for one.
+def told(whole: Evidence, evidence: Evidence, contact: Contact, laws: Sequence[Effect]) -> bool:
+    """Whether an event can be told from a law of the motion where a run is too short to search for one.
 
     A joint that shows it leaves a multiple of what it leaves at other times, when a law would show, too; or it does not
-    slide at all.
+    slide at all. And no law of these joints explains the run as well.
 
     Args:
         whole: the run.
         evidence: the run without its events.
+        laws: laws that leave no more of it than all events do.
     """
+    if any(law.joint is None or contact.shown & set(law.indices) for law in laws):
+        return False
     left, scale = (evidence.residual([]) / evidence.scale) ** 2, evidence.scale
 
     def stands_out(j: int) -> bool:

@@ -13,7 +13,7 @@ from armloop.data.motion import Samples
 from armloop.data.repeats import require_different
 from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
-from armloop.diagnosis.account import Account, best_account
+from armloop.diagnosis.account import Account, best_account, laws_instead
 from armloop.diagnosis.carried import account_with_load
 from armloop.diagnosis.contacts import Contact, drowned, find_contacts, known_contacts, told, without
 from armloop.diagnosis.evidence import Evidence
@@ -268,7 +268,7 @@ def diagnose(
     contacts = find_contacts(whole, whole.residual([]))
     evidence = without(whole, contacts)
     if too_still(evidence):
-        found = _by_events_alone(whole, evidence, contacts)
+        found = _by_events_alone(whole, contacts, progress, jobs)
     else:
         blocks = len(np.unique(evidence.blocks))
         progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
@@ -280,9 +280,14 @@ def diagnose(
     return replace(found, standing=stand, zeros=zeros)
 
 
-def _by_events_alone(whole: Evidence, evidence: Evidence, contacts: list[Contact]) -> Diagnosis:
+def _by_events_alone(
+    whole: Evidence, contacts: list[Contact], progress: Progress, jobs: int | None
+) -> Diagnosis:
     """The verdict on a run in which too little moves to look for anything but events."""
-    untold = [contact for contact in contacts if not told(whole, evidence, contact)]
+    with Hypotheses(whole, jobs) as panel:
+        laws = laws_instead(whole, contacts, panel, progress)
+    evidence = without(whole, contacts)
+    untold = [contact for contact in contacts if not told(whole, evidence, contact, laws)]
     contacts = [contact for contact in contacts if contact not in untold]
     evidence = without(whole, contacts)
     nothing = fit(evidence, evidence.residual([]), [], [])
