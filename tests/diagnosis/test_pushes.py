@@ -27,7 +27,7 @@ class TestChoice:
         monkeypatch: pytest.MonkeyPatch,
         shares: Shares,
         joints: int = 7,
-        own: float = 0.9,
+        own: Shares | float = 0.9,
         shown: Any = (0, 1),
         tool: float = 0.1,
     ) -> tuple[str, list[tuple[str, int | None, float]]] | None:
@@ -41,7 +41,10 @@ class TestChoice:
             if name not in shares:
                 return None
             nothing: Any = None
-            return pushes.Contact(SimpleNamespace(name=name), nothing, nothing, nothing, shares[name], own)  # type: ignore[arg-type]
+            noticed = own if isinstance(own, float) else own[name]
+            return pushes.Contact(
+                SimpleNamespace(name=name), nothing, nothing, nothing, shares[name], noticed
+            )  # type: ignore[arg-type]
 
         monkeypatch.setattr(pushes, "_trial", trial)
         monkeypatch.setattr(pushes, "_somewhere", lambda found, points: found)
@@ -63,7 +66,8 @@ class TestChoice:
         assert weights[0].tolist() == [[2.0, 0.25], [2.0, 0.0]]
         if found is None:
             return None
-        assert (found.share, found.own) == (shares[found.added.name], own)  # type: ignore[attr-defined]
+        assert found.share == shares[found.added.name]  # type: ignore[attr-defined]
+        assert found.own == (own if isinstance(own, float) else own[found.added.name])  # type: ignore[attr-defined]
         return found.added.name, [(e.name, e.joint, share) for e, share in found.rivals]  # type: ignore[attr-defined]
 
     def test_on_an_arm_of_more_than_three_joints_it_is_a_force_if_that_explains_as_much(
@@ -72,10 +76,15 @@ class TestChoice:
         torque = ("external_torque", 1)
         assert self.pushed(monkeypatch, {"t1": 0.9, "f0": 0.86}, 4) == ("f0", [(*torque, 0.9)])
         assert self.pushed(monkeypatch, {"t1": 0.9, "f0": 0.84}, 4) == ("t1", [])
-        # two or three joints feel it as they feel a torque, which is simpler
-        found = self.pushed(monkeypatch, {"t1": 0.86, "f0": 0.9}, 3)
+        # two or three joints feel it as they feel a torque, which is simpler: of the joints that show it
+        more = {"t1": 0.7, "f0": 0.9}
+        found = self.pushed(monkeypatch, more, 3, own={"t1": 0.86, "f0": 0.9})
         assert found == ("t1", [("external_contact", None, 0.9)])
-        assert self.pushed(monkeypatch, {"t1": 0.84, "f0": 0.9}, 3) == ("f0", [])
+        assert self.pushed(monkeypatch, more, 3, own={"t1": 0.84, "f0": 0.9}) == ("f0", [])
+        assert self.pushed(monkeypatch, more, 4, own={"t1": 0.9, "f0": 0.9}) == ("f0", [])
+        # or of all
+        found = self.pushed(monkeypatch, {"t1": 0.86, "f0": 0.9}, 3, own={"t1": 0.7, "f0": 0.9})
+        assert found == ("t1", [("external_contact", None, 0.9)])
 
     def test_on_the_tool_before_a_link_and_of_links_or_joints_the_one_that_explains_most(
         self, monkeypatch: pytest.MonkeyPatch
@@ -86,8 +95,13 @@ class TestChoice:
         assert self.pushed(monkeypatch, {"t1": 0.88, "t2": 0.9}) == ("t2", [("external_torque", 1, 0.88)])
 
     def test_where_no_tool_is_known_it_may_be_on_the_last_link(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        assert self.pushed(monkeypatch, {"t1": 0.6, "f0": 0.4, "f3": 0.9}, 3, tool=0.0) == ("f3", [])
-        assert self.pushed(monkeypatch, {"t1": 0.6, "f2": 0.9}, 2, tool=0.0) == ("f2", [])
+        assert self.pushed(
+            monkeypatch, {"t1": 0.6, "f0": 0.4, "f3": 0.9}, 3, own={"t1": 0.6, "f0": 0.4, "f3": 0.9}, tool=0.0
+        ) == ("f3", [])
+        assert self.pushed(monkeypatch, {"t1": 0.6, "f2": 0.9}, 2, own={"t1": 0.6, "f2": 0.9}, tool=0.0) == (
+            "f2",
+            [],
+        )
         # where it explains no more than one at the last joint's place, that is named
         assert self.pushed(monkeypatch, {"f0": 0.86, "f4": 0.9}, 4, tool=0.0) == ("f0", [])
 

@@ -107,10 +107,15 @@ def push(
     tried = agreed if any(trial.own >= MOSTLY for trial, _ in agreed) else tried
     if not tried:
         return None
-    most = max(trial.share for trial, _ in tried)
-    equals = [(trial, kind) for trial, kind in tried if trial.share >= most - FREEDOM]
     # What pushes an arm is a force far more often than a torque on one joint; two or three joints cannot tell.
     forceful = n > FEW
+    most, noticed = (max(getattr(trial, of) for trial, _ in tried) for of in ("share", "own"))
+    # There a force is free to explain what joints that show nothing of it always leave: it is as good without.
+    equals = [
+        (trial, kind)
+        for trial, kind in tried
+        if trial.share >= most - FREEDOM or (not forceful and trial.own >= noticed - FREEDOM)
+    ]
 
     def order(pair: tuple[Contact, _Kind]) -> tuple[bool, int, bool, float]:
         trial, kind = pair
