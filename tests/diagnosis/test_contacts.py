@@ -316,9 +316,11 @@ class TestFinding:
         assert named(*pair) == [(1, both), (2, both)] and asked == [[0, 1], [0], [1]]
         told[0, 1] = ("external_contact", None, 0.851)
         assert named(*pair) == [(None, both)]
-        # a single torque is simpler, and one joint has but one
-        told[0, 1] = ("external_torque", 2, 0.6)
-        assert named(*pair) == [(2, both)] and asked == [[0, 1]]
+        # so is a single torque, and one joint has but one
+        told[0, 1] = ("external_torque", 2, 0.851)
+        assert named(*pair) == [(2, both)]
+        told[0, 1] = ("external_torque", 2, 0.849)
+        assert named(*pair) == [(1, both), (2, both)]
         assert named((40, 50, 0)) == [(1, frozenset({0}))] and asked == [[0]]
         # what no torque explains at one of the joints is a force
         told[0, 1], told[1,] = ("external_contact", None, 0.6), ("external_contact", None, 0.9)

@@ -114,9 +114,10 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
 def _one_or_each(
     evidence: Evidence, residual: Array, burst: Burst, counted: Mask, bursts: Sequence[Burst]
 ) -> list[Contact]:
-    """The event in a burst, or a torque on each of its joints, where these explain surely more than one force does.
+    """The event in a burst, or a torque on each of its joints, where these explain surely more than one event does.
 
-    On few joints a force has as much freedom as the torques, each with an interval of its own.
+    On few joints a force has as much freedom as the torques, each with an interval of its own; and of one torque the other
+    joints, whose motion is known, show nothing.
 
     Args:
         counted: (N, n) samples that tell of it.
@@ -124,7 +125,7 @@ def _one_or_each(
     """
     joints = sorted(burst.joints)
     one = push(evidence, residual, burst.rows, counted, joints)
-    if len(joints) < 2 or evidence.model.arm.n > FEW or (one and one.added.effect.joint is not None):
+    if len(joints) < 2 or evidence.model.arm.n > FEW:
         return [one] if one else []
     each = []
     for j in joints:
