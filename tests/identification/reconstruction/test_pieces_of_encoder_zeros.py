@@ -184,7 +184,13 @@ class TestWholeSearch:
     @pytest.fixture
     def asked(self, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         own, _ = table()
-        asked: dict[str, Any] = {"table": own, "clear": True, "left": {}}
+        asked: dict[str, Any] = {
+            "table": own,
+            "clear": True,
+            "offsets clear": False,
+            "left": {},
+            "compared": [],
+        }
         zeros, spread = np.arange(8.0).reshape(LOGS, JOINTS), np.array([0.1, 0.2])
 
         class Faked:
@@ -206,8 +212,8 @@ class TestWholeSearch:
                 return np.zeros(P), zeros, spread
 
         def clearly(model: Any, before: Any, after: Any) -> bool:
-            asked["compared"] = before, after
-            return bool(asked["clear"])
+            asked["compared"].append((before, after))
+            return bool(asked["clear"]) if before is asked["left"][""] else bool(asked["offsets clear"])
 
         def table_at(logs: Any, *rest: Any) -> Any:
             asked["at"] = rest[3]
@@ -246,8 +252,9 @@ class TestWholeSearch:
         found = self.found()
         assert found.found and found.spread.tolist() == [0.1, 0.2] and found.zeros[3].tolist() == [6.0, 7.0]
         assert asked["solved"] == ("zeros", [True] * N)
-        before, after = asked["compared"]
-        assert before is asked["left"][""] and after is asked["left"]["zeros"]
+        (before, after), (zeros, offsets) = asked["compared"]
+        assert before is asked["left"][""] and after is zeros is asked["left"]["zeros"]
+        assert offsets is asked["left"]["offsets"]
 
         def rms(x: Array, j: int) -> float:
             return float(np.linalg.norm(x[own.moving[:, j], j]))
@@ -256,7 +263,9 @@ class TestWholeSearch:
         for value, left in zip(found.errors.values(), asked["left"].values(), strict=True):
             shares = [rms(left, j) / rms(own.tau, j) for j in range(JOINTS)]
             assert value == pytest.approx(np.sqrt(shares[0] * shares[1]))
-        asked["clear"] = False
+        asked["offsets clear"] = True
+        assert not self.found().found
+        asked |= {"offsets clear": False, "clear": False}
         assert not self.found().found
 
     def test_instants_within_the_memory_of_the_residual_tell_the_same(self, asked: dict[str, Any]) -> None:
