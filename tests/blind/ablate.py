@@ -111,7 +111,7 @@ RULES = [
     ),
     _rule(
         "nothing is judged below the slowest trained speed",
-        lambda model, motion: np.zeros(motion.q.shape, dtype=bool),
+        lambda model, samples: np.zeros(samples.tau.shape, dtype=bool),
         (evidence, "too_slow"),
     ),
     _rule("a joint that is shaken rests", lambda s, m: s.moving.copy(), (evidence, "_sliding")),

@@ -146,7 +146,7 @@ class TestReasons:
         monkeypatch.setattr(reasons, "parts_of", lambda of: [Parts(j) for j in (1, 2, 3)])
         monkeypatch.setattr(reasons, "outside_trained_range", lambda motion, ranges: far.mean(axis=0))
         monkeypatch.setattr(reasons, "far_outside", lambda motion, ranges: far)
-        monkeypatch.setattr(reasons, "too_slow", lambda model, motion: np.zeros((50, 3), dtype=bool))
+        monkeypatch.setattr(reasons, "too_slow", lambda model, samples: np.zeros((50, 3), dtype=bool))
         monkeypatch.setattr(reasons, "sliding", lambda samples, model: slides)
         monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
         monkeypatch.setattr(

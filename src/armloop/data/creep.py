@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from armloop.data.motion import Samples
 from armloop.util.arrays import Array, Mask
@@ -21,3 +22,16 @@ def may_stick(fastest: Array) -> Array:
 def creeping(samples: Samples, speeds: Array) -> Mask:
     """(N, n) moving samples slower than a part of the largest speeds (n,) of the training, rad/s (m/s)."""
     return np.asarray(samples.moving & (np.abs(samples.motion.v) < CREEPING * speeds))
+
+
+def held_speed(samples: Samples) -> Array:
+    """(N, n) largest speed within the low-pass's reach of each sample, rad/s (m/s).
+
+    What the filter mixes with faster motion tells of that: a joint that only passes through a slow speed, as it starts,
+    stops or turns round, shows next to nothing of its friction there.
+    """
+    speed = np.abs(samples.motion.v)
+    width = 2 * round(samples.reach / samples.period) + 1
+    for run in samples.motion.runs() if width > 1 else ():
+        speed[run] = maximum_filter1d(speed[run], width, axis=0, mode="nearest")
+    return speed

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves, widened
-from armloop.data.creep import may_stick
+from armloop.data.creep import held_speed, may_stick
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.scoring import filtered_context, residual
@@ -103,7 +103,7 @@ class Evidence:
         blocks = block_numbers(samples.motion, _block_seconds(samples.motion, shortest_block(model)))
         context = filtered_context(model, samples, effects)
         rows = sliding(samples, model)
-        rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples.motion)
+        rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples)
         rows &= ~samples.at_an_end[:, None]
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(model, samples, scale, variation, rows, blocks, context, asked, unknown)
@@ -256,9 +256,12 @@ def far_outside(motion: Motion, ranges: Any) -> Mask:
     return np.asarray(np.any([np.abs(x) > FAR * np.maximum(size, 1e-9) for x, size in parts], axis=0))
 
 
-def too_slow(model: ReconstructedModel, motion: Motion) -> Mask:
-    """(N, n) samples in which a joint is slower than it slid in training: what friction is there, the model cannot know."""
-    return np.asarray(np.abs(motion.v) < np.asarray(model.history.get("slowest") or 0.0))
+def too_slow(model: ReconstructedModel, samples: Samples) -> Mask:
+    """(N, n) samples around which a joint is slower than it slid in training: what friction is there, the model cannot know.
+
+    Where it only passes through such a speed, it did so in training, too.
+    """
+    return np.asarray(held_speed(samples) < np.asarray(model.history.get("slowest") or 0.0))
 
 
 def near_standstill(samples: Samples) -> Mask:

@@ -59,7 +59,7 @@ def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect
     left = [np.inf if x is None else x for x in model.baseline.get("creeping") or [None]]
     creeping = np.minimum(SIGNIFICANCE * np.array(left) + more, _UNSURE * dry)
     creeping = creeping * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
-    creeping = np.where(too_slow(model, motion), _UNSURE * dry, creeping)
+    creeping = np.where(too_slow(model, samples), _UNSURE * dry, creeping)
     creeping = creeping + shared_dry(evidence, known, slow)
     # The filter averages what friction may hold with what it may not: a joint that turns round fast rests but a moment.
     unsure = np.maximum(smooth(samples, np.where(rest, dry, creeping)), 0.0)

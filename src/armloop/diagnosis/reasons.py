@@ -66,7 +66,7 @@ def standing(
     left = evidence.left_by(augmented)
     parts = parts_of(witness(left, samples, evidence.context.load))
     outside = outside_trained_range(samples.motion, model.history.get("range"))
-    strays, creeps = far_outside(samples.motion, model.history.get("range")), too_slow(model, samples.motion)
+    strays, creeps = far_outside(samples.motion, model.history.get("range")), too_slow(model, samples)
     far = strays.mean(axis=0)
     slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
     slides = sliding(samples, model)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from synthetic import three_axis
 
-from armloop.data.motion import Motion
+from armloop.data.motion import Motion, Samples
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import shared
 from armloop.laws.friction import FrictionTerm
@@ -19,9 +18,7 @@ from armloop.util.errors import ExcitationError
 class TestSharedSamples:
     def samples(self, v: np.ndarray, cutoff: float = 5.0, starts: tuple[int, ...] = (0,)) -> Any:
         motion = Motion(np.arange(len(v)) * 0.1, 0 * v, v, 0 * v, np.array(starts))
-        return SimpleNamespace(
-            motion=motion, cutoff_hz=cutoff, period=0.1, moving=np.abs(v) > 0.001, fastest=None
-        )
+        return Samples(motion, 0 * v, np.abs(v) > 0.001, 0.1, cutoff_hz=cutoff)
 
     def test_steady_creep_keeps_direction_and_half_of_its_speed_over_a_period_of_the_corner(self) -> None:
         v = np.full((30, 1), 0.008)
@@ -60,9 +57,20 @@ class TestSharedSamples:
     def test_the_slowest_speed_of_what_is_fitted(self) -> None:
         """Speeds from 0.02 to 1.02 evenly, forth and back; what is slower is turned round or at rest."""
         v = np.concatenate([np.linspace(1.02, 0.02, 1001), np.zeros(200), -np.linspace(0.02, 1.02, 1001)])
-        samples = self.samples(np.column_stack([v, 0 * v]))
+        samples = self.samples(np.column_stack([v, 0 * v]), cutoff=0.0)
         samples.moving[1001:1201], samples.moving[:, 1] = False, False
         assert shared.slowest_sliding(samples) == pytest.approx([0.025, 0.0], abs=1e-3)
+
+    def test_a_speed_that_a_joint_only_passes_through_is_not_known(self) -> None:
+        """Moves at 0.4 rad/s from stop to stop with ramps of 0.2 s, through a low-pass that smears a tenth of a second."""
+        move = np.concatenate([np.linspace(0.0, 0.4, 21), np.full(79, 0.4), np.linspace(0.4, 0.0, 21)])
+        v = np.concatenate([sign * move for sign in (1, -1) * 10])[:, None]
+        motion = Motion(np.arange(len(v)) * 0.01, 0 * v, v, 0 * v, np.array([0]))
+        samples = Samples(motion, 0 * v, np.abs(v) > 0.01, 0.01, cutoff_hz=5.0)
+        assert shared.slowest_sliding(samples)[0] >= 0.2
+        held = Motion(motion.time, 0 * v, v / 20, 0 * v, motion.starts)
+        slow = Samples(held, 0 * v, samples.moving, 0.01, cutoff_hz=5.0)
+        assert shared.slowest_sliding(slow) == pytest.approx([0.02])
 
     def test_joints_must_move_and_terms_that_vanished_are_left_out(self) -> None:
         shared.check_moves(three_axis(), np.array([100, 100, 100]))

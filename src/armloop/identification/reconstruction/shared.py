@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from armloop.data.creep import may_stick
+from armloop.data.creep import held_speed, may_stick
 from armloop.data.filters import at_least
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import Conditioning
@@ -83,12 +83,12 @@ def motion_range(motion: Motion) -> list[list[float]]:
 
 
 def slowest_sliding(samples: Samples) -> list[float]:
-    """(n,) slowest speed, rad/s (m/s), at which each joint's friction is known: of what is fitted, 0.5 % is slower.
+    """(n,) slowest held speed, rad/s (m/s), at which each joint's friction is known: of what is fitted, 0.5 % is slower.
 
     Zero where a joint never slides.
     """
     rows = sliding_rows(samples)
-    speeds = (np.abs(v[mine]) for v, mine in zip(samples.motion.v.T, rows.T, strict=True))
+    speeds = (v[mine] for v, mine in zip(held_speed(samples).T, rows.T, strict=True))
     return [float(np.quantile(v, _TAIL)) if len(v) else 0.0 for v in speeds]
 
 
