@@ -278,7 +278,9 @@ class TestWhatIsKnownOfARun:
             (1e3, 0.25),
             (0.0, 0.25),
         ):
-            samples: Any = SimpleNamespace(motion=given, tau=tau, cutoff_hz=cutoff, unknown=None)
+            samples: Any = SimpleNamespace(
+                motion=given, tau=tau, cutoff_hz=cutoff, unknown=None, period=0.25, reach=0
+            )
             samples.at_an_end = np.zeros(40, dtype=bool)
             made = Evidence.of(model, samples, [])
             assert made.context.period == pytest.approx(max(period, 0.25))
