@@ -88,6 +88,9 @@ class Answers:
             ),
             "event_untold": lambda event: f"not told: {event}",
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
+            "plainest": lambda evidence, outcome, among: self.note(
+                "plain", (evidence.name, list(among)), outcome
+            ),
             "strongest_first": lambda evidence, outcome: self.note("ordered", evidence.name, outcome),
             "without_law": lambda evidence, law: evidence,
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
@@ -221,7 +224,7 @@ def test_a_run_that_moves_is_searched(
     name = "turned" if turned else "account"
     assert (made.outcome.name, made.evidence.name) == (name, name) and made.strengths[0] == name
     assert (made.reversals is not None) == turned and answers.asked["useful"] == (name, name)
-    assert answers.asked["ordered"] == name
+    assert answers.asked["plain"][0] == name and answers.asked["ordered"] == name
     assert answers.asked["carried"] == ("whole", "account", 2)
     model = ("with", *found, *(["push"] if contacts else []))
     assert made.model == model

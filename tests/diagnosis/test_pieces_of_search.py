@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from scores import score
 
 from armloop.diagnosis import search as searching
+from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import much_is_left
 from armloop.laws.effects import effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
@@ -149,16 +151,48 @@ class TestSearch:
         self,
     ) -> None:
         memory = (FrictionTerm("sign", 2.0), FrictionTerm("hysteresis", 1.0, 0.002))
-        search: Any = object.__new__(searching._Search)
-        search.evidence = SimpleNamespace(
+        evidence: Any = SimpleNamespace(
             model=SimpleNamespace(friction=FrictionLaw((memory, memory, memory[:1])))
         )
+        remembered = partial(searching.remembered, evidence)
         best = effect("presliding_hysteresis", 2)
-        assert search._remembered(effect("coulomb_friction", 2), best)
+        assert remembered(effect("coulomb_friction", 2), best)
         others = (("coulomb_friction", 1), ("viscous_friction", 2), ("stribeck_friction", 2))
-        assert not any(search._remembered(effect(*law), best) for law in others)
+        assert not any(remembered(effect(*law), best) for law in others)
         plain = effect("coulomb_friction", 3), effect("presliding_hysteresis", 3)
-        assert not search._remembered(*plain) and not search._remembered(best, plain[0])
+        assert not remembered(*plain) and not remembered(best, plain[0])
+
+    @pytest.mark.parametrize(
+        ("share", "joint", "among", "named"),
+        [
+            (0.855, 1, True, "coulomb"),
+            (0.85, 1, True, "presliding"),
+            (0.9, 2, True, "presliding"),
+            (0.9, 1, False, "presliding"),
+        ],
+    )
+    def test_it_is_named_where_it_removes_all_but_a_twentieth(
+        self, share: float, joint: int, among: bool, named: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Of joint 1, whose friction in the model has memory; in that of joint 2 it has none."""
+        memory = (FrictionTerm("sign", 2.0), FrictionTerm("hysteresis", 1.0, 0.002))
+        evidence: Any = SimpleNamespace(model=SimpleNamespace(friction=FrictionLaw((memory, memory[:1]))))
+        plain, spring = effect("coulomb_friction", joint), effect("joint_spring", joint)
+        rivals = [(spring, 0.89), (plain, share)]
+        richer = searching.Found(
+            effect("presliding_hysteresis", joint), Shape.fixed(0.002), 0.9, rivals, always=True
+        )
+        other = searching.Found(effect("torque_offset", joint), Shape.fixed(0.0), 0.1)
+        known: Any = SimpleNamespace(
+            trial=lambda of: SimpleNamespace(shapes=[Shape.fixed(0.0)]) if of is plain else None, fit=None
+        )
+        monkeypatch.setattr(searching, "_known", lambda _, found: known)
+        outcome: Any = searching.Outcome([other, richer], None, None)  # type: ignore[arg-type]
+        first, one = searching.plainest(evidence, outcome, [richer] if among else []).found
+        assert first is other and one.effect.name.startswith(named) and one.always
+        if named == "coulomb":
+            assert (one.share, one.shape) == (share, Shape.fixed(0.0))
+            assert one.rivals == [(richer.effect, 0.9), (spring, 0.89)]
 
     def test_what_is_not_clear_of_its_error_makes_way_for_what_it_stood_in_the_way_of(
         self, monkeypatch: pytest.MonkeyPatch

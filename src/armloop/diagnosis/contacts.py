@@ -16,10 +16,10 @@ from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside
 from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innovations
-from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
+from armloop.diagnosis.judgement import FREEDOM, MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
-from armloop.diagnosis.pushes import FEW, FREEDOM, PAUSE, SHORTEST, Contact, around, push
+from armloop.diagnosis.pushes import FEW, PAUSE, SHORTEST, Contact, around, push
 from armloop.laws.effects import Effect
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect, ReconstructedModel

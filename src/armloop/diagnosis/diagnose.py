@@ -26,6 +26,7 @@ from armloop.diagnosis.search import (
     Outcome,
     Strength,
     outweighed,
+    plainest,
     refitted,
     strengths,
     strongest_first,
@@ -321,7 +322,8 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
         outcome = useful(evidence, outcome)
     else:
         outcome = refitted(evidence, useful(bare, refitted(bare, outcome)))
-    outcome = strongest_first(evidence, outcome)
+    searched = [f for f in outcome.found if turned is None or f not in turned.found]
+    outcome = strongest_first(evidence, plainest(evidence, outcome, searched))
     progress("how far the run can be judged")
     known = [] if unlisted is None else [unlisted.joint]
     doubted: list[str] = []

@@ -21,6 +21,8 @@ CHANCE = 2.0
 #: … or on every joint by no more than this part of the baseline's energy, or of what the best removes there: no law is
 #: met exactly, and a richer one soaks up both.
 ALIKE, NEARLY = 0.4, 0.003
+#: Of hypotheses with less freedom and with more, the former is it if the latter explains no more than so much more.
+FREEDOM = 0.05
 #: What removes at least this part of what another does removes most of it.
 MOST = 0.75
 #: So many times the baseline is no baseline any more.

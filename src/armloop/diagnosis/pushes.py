@@ -10,7 +10,7 @@ from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import REFINEMENTS
-from armloop.diagnosis.judgement import MOSTLY, NOTICEABLE, enough, leaves_more
+from armloop.diagnosis.judgement import FREEDOM, MOSTLY, NOTICEABLE, enough, leaves_more
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.base import number
@@ -22,9 +22,6 @@ from armloop.util.arrays import TINY, Array, Index, Mask
 PAUSE = 0.3
 #: An event lasts this long at least, s; pieces of it that are as long tell by themselves.
 SHORTEST = 0.1
-#: What was there must explain most of the event's energy, and a torque on one joint, or a force on the tool, is it if
-#: nothing with more freedom explains so much more.
-FREEDOM = 0.05
 #: So many joints or fewer feel a force as if it were a torque on any of them.
 FEW = 3
 #: Points at which a force may have acted lie so many links apart.

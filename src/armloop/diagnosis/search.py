@@ -14,6 +14,7 @@ import numpy as np
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
+    FREEDOM,
     MOST,
     SIGNIFICANCE,
     gain,
@@ -228,19 +229,13 @@ class _Search:
             if trial.effect.place != effect.place
             and (
                 log_posterior(self.evidence, trial.score, [trial.effect]) >= least
-                or (self._remembered(trial.effect, effect) and gain(current, trial.score) >= MOST * most)
+                or (
+                    remembered(self.evidence, trial.effect, effect)
+                    and gain(current, trial.score) >= MOST * most
+                )
             )
         ]
         return Found(effect, found[k].shape, min(most / whole, 1.0), rivals)
-
-    def _remembered(self, effect: Effect, best: Effect) -> bool:
-        """Whether the best has an effect in it, and memory, in a joint whose friction has memory in the model.
-
-        Dry friction that rises there has it, too, which its law lacks.
-        """
-        if not (_nested(effect, best) and best.rubs and best.memory and best.joint is not None):
-            return False
-        return self.evidence.model.friction.remembers(best.joint - 1)
 
 
 def _known(evidence: Evidence, found: Sequence[Found]) -> Known:
@@ -305,6 +300,39 @@ def useful(evidence: Evidence, outcome: Outcome) -> Outcome:
         if other is not dropped and _nested(dropped.effect, other.effect):
             other.rivals.append((dropped.effect, dropped.share))
     return useful(evidence, without_effect(evidence, outcome, dropped))
+
+
+def remembered(evidence: Evidence, effect: Effect, best: Effect) -> bool:
+    """Whether the best has an effect in it, and memory, in a joint whose friction has memory in the model.
+
+    Dry friction that rises there has it, too, which its law lacks.
+    """
+    if not (_nested(effect, best) and best.rubs and best.memory and best.joint is not None):
+        return False
+    return evidence.model.friction.remembers(best.joint - 1)
+
+
+def plainest(evidence: Evidence, outcome: Outcome, among: Collection[Found]) -> Outcome:
+    """The outcome with a nested law in the place of one with memory, where the model's friction has that memory already.
+
+    The law must remove all but little of what the richer does, which is its alternative then.
+
+    Args:
+        among: the effects that may give way.
+    """
+    found, there = list(outcome.found), {f.effect.place for f in outcome.found}
+    for k, richer in enumerate(found):
+        for effect, share in richer.rivals if richer in among else []:
+            enough = share >= (1 - FREEDOM) * richer.share and effect.place not in there
+            if not (enough and remembered(evidence, effect, richer.effect)):
+                continue
+            trial = _known(evidence, _others(found, k)).trial(effect)
+            if trial is not None:
+                others = [pair for pair in richer.rivals if pair[0] is not effect]
+                rivals = [(richer.effect, richer.share), *others]
+                found[k] = replace(richer, effect=effect, shape=trial.shapes[-1], share=share, rivals=rivals)
+                break
+    return outcome if found == outcome.found else _with_only(evidence, outcome, found)
 
 
 def _nested(effect: Effect, law: Effect) -> bool:
