@@ -113,6 +113,10 @@ def watch(
             if own:
                 mine = {log: place for log, place in places.items() if log in own}
                 tasks.append(Task(folder.folder, arm, path, mine, options))
+        if tasks:
+            progress(
+                "testing the arms with new logs; what an alarm is about is diagnosed, which may take minutes"
+            )
         tell, arms, before = paced(progress), [], _diagnosed(folder)
         for answer in workers.map(test_arm, tasks) if tasks else ():
             arms.append(answer)
