@@ -333,6 +333,23 @@ def test_a_late_speed_is_moved_run_by_run_and_never_beyond_its_end() -> None:
     np.testing.assert_array_equal(moved[-2:], log.v[-2:])
 
 
+def test_part_of_a_run_is_conditioned_as_in_the_whole() -> None:
+    log = filtered_by_its_driver(sines(np.arange(0, 20, 0.004)), 30.0, 0.5)
+    log.tau[2050] += 50.0
+    part, alone = (cut(slice(2000, 2120)) for cut in (log.stretch, log.select))
+    # half a second says nothing of a lag, and less of what lies far out
+    assert alone.velocity_lag == 0.0
+    assert part.velocity_lag == log.velocity_lag > 0.003
+    whole, own = (preprocess([x], TEN_HZ) for x in (log, part))
+    # but for what the filter's ends cost
+    inside = np.searchsorted(whole.motion.time, own.motion.time[8:-8] - 1e-6)
+    for name, near in (("q", 0.01), ("v", 0.3)):
+        expected = getattr(whole.motion, name)[inside]
+        np.testing.assert_allclose(getattr(own.motion, name)[8:-8], expected, atol=near)
+    np.testing.assert_allclose(own.tau[8:-8], whole.tau[inside], atol=0.02 * np.abs(log.tau[:2000]).max())
+    np.testing.assert_array_equal(part.tau, log.tau[2000:2120])
+
+
 def test_a_lag_that_is_not_felt_below_the_corner_is_left() -> None:
     log = filtered_by_its_driver(sines(np.arange(0, 20, 0.002)), 60.0)
     in_time = replace(log)

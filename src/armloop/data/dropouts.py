@@ -8,7 +8,7 @@ to the last digit, or is cut off, is left out: nothing is fitted to it, and noth
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -60,6 +60,17 @@ def repaired(log: Recorded, lag: float = 0.0) -> Recorded:
 def mended(log: Recorded) -> Recorded:
     """The record with what lies beside them in place of rows that coincide, repeated rows and spikes."""
     return _without_spikes(_moving_on(_at_their_instants(log)))
+
+
+def mended_part(log: Recorded, rows: slice, runs: Sequence[slice]) -> Recorded:
+    """Some rows of a record, in runs of their own, mended with the whole: the few say less of what lies far out."""
+    whole = mended(log)
+    vdot = None if whole.vdot is None else whole.vdot[rows]
+    part = Recorded(
+        whole.time[rows], whole.q[rows], whole.v[rows], whole.tau[rows], vdot, runs, whole.derived
+    )
+    part.keep("mended", part)
+    return part
 
 
 def _at_their_instants(log: Recorded) -> Recorded:

@@ -12,12 +12,12 @@ from functools import cached_property
 from html import escape
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armloop.data.dropouts import mended
+from armloop.data.dropouts import mended, mended_part
 from armloop.data.header import check_header, columns_of
 from armloop.data.plausibility import doubts, faults
 from armloop.data.recorded import Finding, Recorded
@@ -65,6 +65,9 @@ class MotionLog:
     name: str = "log"
     tau_unit: str = "N*m"
     v_derived: bool = False
+
+    #: The log of which it is a stretch, and which of its rows.
+    _part_of: ClassVar[tuple["MotionLog", slice] | None] = None
 
     def columns(self) -> dict[str, Array]:
         """Return what was measured by the names of the columns of its file, (N,) each, in their order."""
@@ -185,12 +188,15 @@ class MotionLog:
     @cached_property
     def record(self) -> Recorded:
         """The arrays as checks see them, with what was found of them once the log is conditioned."""
-        return recorded(self)
+        if self._part_of is None:
+            return recorded(self)
+        whole, rows = self._part_of
+        return mended_part(whole.record, rows, self.runs())
 
     @cached_property
     def velocity_lag(self) -> float:
         """The group delay of v behind dq/dt in seconds, 0 if none is sure (see :mod:`armloop.data.redundancy`)."""
-        return velocity_lag(mended(self.record))
+        return self._part_of[0].velocity_lag if self._part_of else velocity_lag(mended(self.record))
 
     def runs(self) -> list[slice]:
         """Return the stretches without a gap as slices; never filter or differentiate across two of them."""
@@ -220,6 +226,12 @@ class MotionLog:
             for key in ("time", "q", "v", "tau", "vdot")
         }
         return unchecked_log(**cut, name=self.name, tau_unit=self.tau_unit, v_derived=self.v_derived)
+
+    def stretch(self, rows: slice) -> "MotionLog":
+        """Return the log of part of a run, conditioned as in the whole: its v is as late, its spikes are as far out."""
+        part = self.select(rows)
+        vars(part)["_part_of"] = self, rows
+        return part
 
 
 def read_log(

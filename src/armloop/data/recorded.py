@@ -45,6 +45,10 @@ class Recorded:
     lost: Mask | None = None
     _known: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
+    def keep(self, function: str, answer: Any) -> None:
+        """Take it as known what a function of the record (:func:`once`) comes to."""
+        self._known[function] = answer
+
 
 def once(function: Callable[[Recorded], Answer]) -> Callable[[Recorded], Answer]:
     """Memoization: what a function of a record came to is kept with the record, and asked for again is not sought anew."""

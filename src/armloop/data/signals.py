@@ -107,6 +107,11 @@ class Speeds:
         return Speeds(velocity_noise(log, cutoff_hz), np.where(travels, fastest, np.inf))
 
     @staticmethod
+    def of_all(logs: Sequence[MotionLog], cutoff_hz: float) -> Speeds:
+        """Those of several logs."""
+        return Speeds.joined(Speeds.of(log, cutoff_hz) for log in logs)
+
+    @staticmethod
     def joined(each: Iterable[Speeds]) -> Speeds:
         """Those of the noisiest log, and of the one in which a joint goes fastest, joint by joint."""
         noises, speeds = zip(*((own.noise, own.fastest) for own in each), strict=True)
@@ -149,7 +154,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, speeds: Speeds | No
     if how.cutoff_hz <= 0:
         return _as_they_are(logs)
     if speeds is None:
-        speeds = Speeds.joined(Speeds.of(log, how.cutoff_hz) for log in logs)
+        speeds = Speeds.of_all(logs, how.cutoff_hz)
     parts, spans = [], []
     for log in logs:
         lag = log.velocity_lag

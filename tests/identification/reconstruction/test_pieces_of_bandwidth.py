@@ -215,7 +215,7 @@ class TestPieces:
 
     def test_a_corner_is_a_number_of_three_decimals(self) -> None:
         log: Any = SimpleNamespace(period=0.00777, samples=10, runs=lambda: [slice(0, 10)])
-        log.read, log.select = lambda: log, lambda rows: log
+        log.read, log.stretch = lambda: log, lambda rows: log
         # 0.4 / 0.00777 s
         assert bandwidth.highest_corner([log], replace(TEN_HZ, cutoff_hz=100.0)) == 51.48
 

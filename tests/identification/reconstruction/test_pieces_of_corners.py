@@ -17,7 +17,7 @@ class TestCorners:
     @staticmethod
     def log(period: float, samples: int = 10) -> Any:
         log = SimpleNamespace(period=period, samples=samples, name="run", runs=lambda: [slice(0, samples)])
-        log.read, log.select = lambda: log, lambda rows: SimpleNamespace(**{**vars(log), "rows": rows})
+        log.read, log.stretch = lambda: log, lambda rows: SimpleNamespace(**{**vars(log), "rows": rows})
         return log
 
     def test_the_highest_is_four_tenths_of_the_lowest_rate(self) -> None:

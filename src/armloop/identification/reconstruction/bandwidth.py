@@ -20,7 +20,15 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
-from armloop.data.signals import Conditioning, ShortRunError, as_torque, preprocess, smooth, too_short
+from armloop.data.signals import (
+    Conditioning,
+    ShortRunError,
+    Speeds,
+    as_torque,
+    preprocess,
+    smooth,
+    too_short,
+)
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
@@ -206,11 +214,13 @@ def table_at(
     """
     parts: list[tuple[Array, Array, Index, Mask]] = []
     motions: list[Motion] = []
-    lowest, following = min(corners), 0
+    lowest, following, fine = min(corners), 0, replace(how, cutoff_hz=corner, oversampling=1e9)
+    # where a joint slides is told by its speed, not by the noise of it
+    anywhere = Speeds(np.zeros(arm.n), np.full(arm.n, np.inf))
     stride = max(1, sum(log.samples for log in logs) * arm.n // _ROWS)
     for k, log in enumerate(logs):
         try:
-            samples = as_torque(preprocess([log], replace(how, cutoff_hz=corner, oversampling=1e9)))
+            samples = as_torque(preprocess([log], fine, anywhere))
         except ShortRunError:
             continue
         motion, period = samples.motion, samples.period

@@ -165,8 +165,7 @@ class Data:
         Raises:
             ShortRunError: no log has a run long enough for the filter.
         """
-        each = (Speeds.of(log, how.cutoff_hz) for log in logs)
-        speeds = Speeds.joined(each) if how.cutoff_hz > 0 else None
+        speeds = Speeds.of_all(logs, how.cutoff_hz) if how.cutoff_hz > 0 else None
         chunks, first = [], 0
         for log in logs:
             chunk = _Conditioned(log, how, speeds, options, first).chunk()

@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
-from armloop.data.signals import ShortRunError, preprocess
+from armloop.data.signals import ShortRunError, Speeds, preprocess
 from armloop.identification.reconstruction.inner_folds import FOLDS
 from armloop.identification.reconstruction.lines import MOST, between, change, lines, waves
 from armloop.identification.reconstruction.projected import CHANCE, block_covariance, block_score
@@ -110,15 +110,16 @@ def _residuals(
     collected: list[list[tuple[Array, Array, Index]]] = [[] for _ in range(model.arm.n)]
     following = number = 0
     period = samples.period
+    speeds = Speeds.of_all(logs, fine.cutoff_hz)
     for log in logs:
         for part in log.runs():
-            one = log.select(part)
+            one = log.stretch(part)
             try:
-                low = preprocess([one], fine)
+                low = preprocess([one], fine, speeds)
             except ShortRunError:
                 continue
             period = low.period
-            full = preprocess([one], replace(fine, cutoff_hz=_BAND / period))
+            full = preprocess([one], replace(fine, cutoff_hz=_BAND / period), speeds)
             time, known = low.motion.time, samples.motion.time[runs[number]]
             nearest = np.clip(np.searchsorted(known, time), 0, len(known) - 1) + runs[number].start
             number += 1

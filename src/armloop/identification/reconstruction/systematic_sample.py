@@ -44,5 +44,5 @@ def placed_runs(logs: Sequence[LogSource]) -> list[tuple[int, MotionLog]]:
         count = max(1, min(len(runs), int(np.ceil(len(runs) * most / max(log.samples, 1)))))
         some = [runs[int(place)] for place in np.linspace(0, len(runs) - 1, count)]
         for run in sorted(some, key=lambda run: run.start):
-            found.append((k, log.select(slice(run.start, min(run.stop, run.start + most)))))
+            found.append((k, log.stretch(slice(run.start, min(run.stop, run.start + most)))))
     return found
