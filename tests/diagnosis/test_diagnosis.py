@@ -64,11 +64,19 @@ def diagnosed(model: ReconstructedModel) -> Callable[[Place], tuple[MotionLog, D
     return of
 
 
+#: Effects that another case has, too.
+AGAIN = (("coulomb_friction", 3), ("torque_ripple", 3))
+
+
 def named(case: Place) -> str:
     return f"{case[0]}-{case[1]}"
 
 
-@pytest.mark.parametrize("case", CASES, ids=named)
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, marks=pytest.mark.long) if case in AGAIN else case for case in CASES],
+    ids=named,
+)
 def test_an_effect_is_found_with_its_parameters_and_is_gone_on_blocks_not_fitted(
     diagnosed: Callable[[Place], tuple[MotionLog, Diagnosis]], case: Place
 ) -> None:

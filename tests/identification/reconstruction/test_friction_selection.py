@@ -46,7 +46,7 @@ def test_without_physics_coefficients_may_have_any_sign():
     assert max(free.held_out.moving["nrmse"]) < 0.05
 
 
-@pytest.mark.parametrize("library", ["rigid-body", "lagrangian"])
+@pytest.mark.parametrize("library", ["rigid-body", pytest.param("lagrangian", marks=pytest.mark.long)])
 def test_only_the_laws_that_are_named_are_chosen(library: str) -> None:
     def kinds(*names: str) -> set[str]:
         options = Options(friction=names, standard_errors=False)

@@ -54,7 +54,7 @@ def zeros_of(found: list[Stance]) -> dict[int, float]:
     return {one.joint: one.angle for one in found if isinstance(one, ZeroOffset)}
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_a_zero_that_is_slightly_off_is_found_within_its_errors(seed: int, tmp_path: Path) -> None:
     arm = six_axes(tmp_path)
     assert check_torques([a_run(arm, seed)], arm, 10.0) == []
