@@ -11,6 +11,7 @@ import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.cli import main
+from armloop.data.clock import likely_unit
 from armloop.data.log import MotionLog, read_log, write_log
 from armloop.data.signals import Conditioning, preprocess
 from armloop.laws.friction import FrictionLaw
@@ -143,6 +144,12 @@ def test_lists_are_converted() -> None:
     assert same.tau.dtype == np.float64 and same.joints == 3
     whole = MotionLog.from_arrays(range(3), [[0], [1], [2]], [[5], [5], [5]], v=[[1], [1], [1]])
     assert whole.q.dtype == np.float64
+
+
+def test_five_samples_a_second_are_enough_however_their_times_are_rounded() -> None:
+    for rate in (5.0, 5.0 * (1 - 1e-9), 2e4 * (1 + 1e-9)):
+        assert likely_unit(rate) is None
+    assert likely_unit(4.99) == ("milliseconds", pytest.approx(4990.0))
 
 
 @pytest.mark.parametrize(("ticks", "unit"), [(1 / 3600, "hours"), (1 / 86400, "days")])

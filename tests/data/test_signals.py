@@ -300,6 +300,17 @@ def test_a_speed_that_its_driver_filters_is_moved_to_where_it_belongs(corner: fl
             assert np.sin(own - right) == pytest.approx(0.0, abs=2 * np.pi * hz * 3e-4)
 
 
+@pytest.mark.parametrize("seconds", [0.02, 0.045, 0.053])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_tracking_filters_long_lag_is_found_though_the_farthest_that_is_tried_is_near_it(
+    seconds: float, seed: int
+) -> None:
+    log, noise = sines(np.arange(0, 40, 0.004), (0.3, 0.5)), np.random.default_rng(seed)
+    moved = np.stack([np.interp(log.time - seconds, log.time, v) for v in log.v.T], axis=1)
+    late = replace(log, v=moved + 0.3 * noise.normal(size=moved.shape))
+    assert late.velocity_lag == pytest.approx(seconds, abs=3e-3)
+
+
 def test_a_speed_that_is_in_time_or_leads_or_is_the_derivative_stays() -> None:
     log = sines(np.arange(0, 20, 0.004))
     noisy = replace(log, v=log.v + 0.02 * np.random.default_rng(5).normal(size=log.v.shape))

@@ -75,7 +75,11 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
         [1e9, -2e6],
         "rigid_body: the mass of link 3 is .*; no link has more than 1e",
     ),
-    (("components", 0, "base_parameters"), [None, [], {"m1": "x"}, {"m1": None}, ...], "base_parameters"),
+    (
+        ("components", 0, "base_parameters"),
+        [None, [], {"m1": "x"}, {"m1": None}, {"zzz": 1.0}, ...],
+        "base_parameters",
+    ),
     (
         ("friction",),
         [None, {}, [[], []], [[]] * 40, [["sign"], [], []], {"sign": 1}, "none", ...],

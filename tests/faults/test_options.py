@@ -42,7 +42,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "a cutoff of nan": (f"{RECONSTRUCT} --cutoff nan", "--cutoff nan"),
     "a cutoff of hours": (
         f"{RECONSTRUCT} --cutoff 1e-9",
-        "--cutoff 1e-09: give a frequency of 0.001 Hz or more",
+        "--cutoff 1e-09: give a frequency from 0.001 to 10000 Hz",
     ),
     "a home that no shell put there": (
         "reconstruct run.csv --arm three_axis --out ~/m.json",
@@ -65,6 +65,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "standard output for logs": ("collect three_axis --out -", "-: --out cannot be standard output"),
     "an infinite cutoff": (f"{RECONSTRUCT} --cutoff inf", "--cutoff inf"),
     "an unknown estimator": (f"{RECONSTRUCT} --estimator magic", "unknown estimator 'magic'"),
+    "a penalty of nothing": (f"{RECONSTRUCT} --penalty 0.1", "estimator 'evidence' has no penalty; .* lasso"),
     "an unknown option": (
         f"{RECONSTRUCT} --magic",
         "reconstruct: unrecognized arguments: --magic; see armloop reconstruct --help",

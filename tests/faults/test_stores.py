@@ -38,6 +38,15 @@ def test_a_file_of_the_store_is_spoilt(name: str, place: Path, capsys: pytest.Ca
         assert status == 0
 
 
+def test_a_mark_that_was_moved_away_is_made_anew(place: Path) -> None:
+    assert main([*WATCH.split(), "run.csv"]) == 0
+    mark = place / "s" / "store.json"
+    whole = mark.read_bytes()
+    mark.rename(place / "moved.json")
+    assert main([*WATCH.split(), "run.csv"]) == 0
+    assert mark.read_bytes() == whole
+
+
 @pytest.mark.parametrize("told", ['{"alarms": 3}', "{}", '{"alarms": [3]}'])
 def test_what_was_told_is_spoilt(told: str, tmp_path: Path) -> None:
     store = Store(tmp_path / "s")

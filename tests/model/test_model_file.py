@@ -155,7 +155,7 @@ NAN = float("nan")
 TAMPERED: dict[str, tuple[Callable[[Data], None], str]] = {
     "another schema": (
         at("schema")("armloop/model/3"),
-        r"schema is 'armloop/model/3', it must be 'armloop/model/2'",
+        r"schema is 'armloop/model/3', of a newer armloop; this one reads up to 'armloop/model/2'",
     ),
     "no schema": (at("schema")(...), r"schema is None"),
     **{f"no {name}": (at(name)(...), f"field '{name}' is missing") for name in FIELDS},

@@ -20,7 +20,7 @@ MAX_ORDER: int = option(
 CUTOFF: float | None = option(
     "low-pass in Hz, 0 for none (default: by held-out error, at most 10)",
     check=Check(
-        lambda hz: hz == 0 or 1e-3 <= hz < 1e4, "give a frequency of 0.001 Hz or more, or 0 for no filter"
+        lambda hz: hz == 0 or 1e-3 <= hz <= 1e4, "give a frequency from 0.001 to 10000 Hz, or 0 for no filter"
     ),
 )
 

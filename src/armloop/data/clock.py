@@ -8,6 +8,8 @@ from armloop.util.arrays import Array
 
 #: Samples a second that a motion of an arm takes, and that no recorder of one exceeds; beyond, the times are no seconds.
 LEAST_RATE, MOST_RATE = 5.0, 2e4
+#: Times are rounded: a rate is known to so small a part of it.
+_ROUNDED = 1e-6
 #: Ticks a second of the clocks that there are, and the rates, Hz, from which on and up to which a log is usually sampled.
 _FINE, _USUAL_RATE = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}, 20.0
 _COARSE, _HIGH_RATE = {"minutes": 1 / 60, "hours": 1 / 3600, "days": 1 / 86400}, 2000.0
@@ -21,7 +23,7 @@ def sample_rate(time: Array) -> float:
 
 def likely_unit(rate: float) -> tuple[str, float] | None:
     """The unit of times that as seconds are of a rate that no log has, and the rate in it, Hz; None for other rates."""
-    if LEAST_RATE <= rate <= MOST_RATE:
+    if LEAST_RATE * (1 - _ROUNDED) <= rate <= MOST_RATE * (1 + _ROUNDED):
         return None
     clocks = _FINE if rate < LEAST_RATE else _COARSE
     found = [(unit, rate * ticks) for unit, ticks in clocks.items()]

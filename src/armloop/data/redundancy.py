@@ -23,8 +23,8 @@ _FROZEN = 0.2
 # Windows that are compared at most.
 _WINDOWS = 5_000
 # Lags that are tried, the one from which on it is said, s, and the standard errors from which on it is one.
-_LAGS, _LAG, _SURE = np.arange(-0.03, 0.0301, 0.001), 0.0035, 5.0
-# Mean square error at the largest lags over the least, from which on a joint's motion tells of a lag.
+_LAGS, _LAG, _SURE = np.linspace(-0.06, 0.06, 121), 0.0035, 5.0
+# Mean square error at the largest lag of either sign over the least, from which on a joint's motion tells of a lag.
 _PLAIN = 4.0
 # Joints agree whose own lags are so near the common one, and most of them, this part, must.
 _AGREE, _MOST = 0.25, 0.75
@@ -241,10 +241,10 @@ def _common_lag(log: Recorded, errors: dict[int, Array]) -> float:
     """The lag of largest likelihood, s, one for all joints, for they share a controller; 0 if the gain may be chance.
 
     Errors are normal with a variance of each joint's own; each window's length is one observation. Only joints count at
-    which the largest lags would be plain: a steady speed fits every lag, and what it errs by is no noise. Where the joints
-    do not agree, it is no lag of theirs.
+    which a lag farthest from the best would be plain: a steady speed fits every lag, and what it errs by is no noise. Where
+    the joints do not agree, it is no lag of theirs.
     """
-    told = [e for e in errors.values() if min(e[0], e[-1]) > _PLAIN * e.min()]
+    told = [e for e in errors.values() if max(e[0], e[-1]) > _PLAIN * e.min()]
     if not told:
         return 0.0
     seconds = sum(float(np.ptp(log.time[run])) for run in log.runs)

@@ -14,7 +14,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
-from armloop.diagnosis.evidence import Evidence, creep, far_outside
+from armloop.diagnosis.evidence import Evidence, creep, far_outside, near_standstill
 from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innovations
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
@@ -248,19 +248,23 @@ def _standing_out(motion: Motion, rows: Index, level: Array, bursts: list[Burst]
 
 
 def _sticks(evidence: Evidence, burst: Burst, held: Array) -> bool:
-    """Whether a joint that alone shows a burst sticks while others slide: they load it, and its friction holds that.
+    """Whether friction may hold all that a joint alone shows: it sticks while others slide and load it, or it sets out.
+
+    As it sets out its friction has yet to reach its level, and the filter brings in torque that no motion determines.
 
     Args:
         held: (N, n) what is left beyond the dry friction that the model knows, in parts of that; as much again may be held,
             and of a joint that never slides in its run, anything: it may have a brake.
     """
-    motion = evidence.samples.motion
+    samples = evidence.samples
     if len(burst.joints) > 1:
         return False
     (j,) = burst.joints
-    slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > MOSTLY
+    slides = (np.abs(samples.motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > MOSTLY
     may_hold = held[burst.rows, j].mean() <= 1.0 or not evidence.rows[:, j].any()
-    return bool(slides.any() and not slides[j] and may_hold)
+    near = near_standstill(samples)[burst.rows, j]
+    sets_out = near[0] and near.mean() > MOSTLY
+    return bool(slides.any() and (sets_out or not slides[j]) and may_hold)
 
 
 def _strays(far: Mask, burst: Burst) -> bool:

@@ -23,8 +23,8 @@ from armloop.util.arrays import Array, Index, Mask
 
 #: Within a link, what to keep first when one of several parameters must stand for the sum.
 _PREFERENCE = ("mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m")
-#: Columns that differ by less than this, relative to their size, are one (URDFs write pi/2 to 12 digits).
-_TOLERANCE = 1e-8
+#: Columns that differ by less than this, relative to their size, are one: URDFs write pi to seven digits or more.
+_TOLERANCE = 1e-6
 _EXCITATION = 200
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.features.double_feature_set import Factors, padded, product_name, products
 from armloop.features.lagrangian import EnergyTerms
-from armloop.features.rigid_body import rotor_names
+from armloop.features.rigid_body import parameter_names, rotor_names
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import joint_torques
 from armloop.util.arrays import Array, Index
@@ -191,6 +191,12 @@ class RigidBody:
     @staticmethod
     def from_dict(data: dict[str, Any], arm: Arm) -> RigidBody:
         base, parameters = data["base_parameters"], np.array(data["parameters"], dtype=float)
+        known = set(parameter_names(arm.n, rotors=True))
+        for name in base:
+            if name.split(" ")[0] not in known:
+                raise ModelError(
+                    f"base_parameters: {name!r:.60} is no sum of parameters of an arm of {arm.n} joints"
+                )
         return RigidBody(parameters, tuple(base), np.array(list(base.values()), dtype=float))
 
 

@@ -32,7 +32,7 @@ class Sparse:
         correlation: number of consecutive samples that carry one sample's worth of independent noise.
 
     Raises:
-        InputError: no estimator of this name.
+        InputError: no estimator of this name, or a penalty for one that has none.
     """
 
     estimator: str = ESTIMATORS[0]
@@ -45,6 +45,11 @@ class Sparse:
         if REGISTRY.find(self.estimator) is None:
             names = ", ".join([*ESTIMATORS, *REGISTRY.own_names()])
             raise InputError(f"unknown estimator {self.estimator!r}; there are: {names}")
+        if self.penalty is not None and not self.how.has_penalty:
+            able = ", ".join(name for name, kind in LISTED.items() if kind.has_penalty)
+            raise InputError(
+                f"estimator {self.estimator!r} has no penalty; leave it out, or choose one that has: {able}"
+            )
 
     @property
     def how(self) -> Estimator:

@@ -324,8 +324,9 @@ def _ordered_chain(plant: Any, moving: list[Any], path: Path) -> list[Any]:
         following = [joint for joint in moving if joint.parent_body().index() in rigid]
         if len(following) != 1:
             names = ", ".join(joint.name() for joint in following) or "none"
+            after = f"link {tip.name()!r}" if ordered else "the base"
             raise ArmError(
-                f"{path}: not a serial arm: {len(following)} moving joints follow link {tip.name()!r} ({names}); "
+                f"{path}: not a serial arm: {len(following)} moving joints follow {after} ({names}); "
                 "lock a gripper's joints (--lock JOINT=VALUE) or name the arm's last link (--tip LINK)"
             )
         ordered.append(following[0])

@@ -266,6 +266,15 @@ def _from_1(data: dict[str, Any]) -> dict[str, Any]:
 _MIGRATIONS = {"armloop/model/1": _from_1}
 
 
+def _other(schema: Any) -> str:
+    """What is wrong with a schema that is not this one."""
+    kind, _, number = schema.rpartition("/") if isinstance(schema, str) else ("", "", "")
+    here, _, mine = SCHEMA.rpartition("/")
+    if kind == here and number.isdecimal() and int(number) > int(mine):
+        return f"of a newer armloop; this one reads up to {SCHEMA!r}"
+    return f"it must be {SCHEMA!r}"
+
+
 def model_data(data: Any) -> dict[str, Any]:
     """What was read from a model file, checked, as one of this schema; raises ``ModelError``, which names the field."""
     found = data.get("schema") if isinstance(data, dict) else None
@@ -273,7 +282,7 @@ def model_data(data: Any) -> dict[str, Any]:
         data = _MIGRATIONS[found](data)
         found = data["schema"]
     if found != SCHEMA:
-        raise ModelError(f"schema is {found!r:.60}, it must be {SCHEMA!r}")
+        raise ModelError(f"schema is {found!r:.60}, {_other(found)}")
     try:
         model = checked(data, ModelData)
     except Misfit as misfit:

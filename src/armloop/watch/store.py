@@ -58,6 +58,8 @@ class Store:
             found = _read_json(mark).get("schema")
             if found != SCHEMA:
                 raise InputError(f"{mark}: schema is {found!r}, it must be {SCHEMA!r}")
+        elif any(self.folder.glob("sums/*/day=*/*.parquet")):
+            _write(mark, {"schema": SCHEMA})  # it was moved away, as a mark that cannot be read should be
         elif self.folder.exists() and any(
             p.name != ".lock" and not p.name.endswith(".part") for p in self.folder.iterdir()
         ):

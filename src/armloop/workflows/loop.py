@@ -83,6 +83,8 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         with clock("reconstruct", "2/7 reconstruct: three steps, each inheriting the last"):
             sealed = workers.submit(_measure_with_effect, scenario, seed, folder / "logs" / "second_run.csv")
             one_shot = workers.submit(_reconstruct, list(logs.values()), plant.arm, "sindy")
+            # it has a core while the main process regresses, diagnoses and draws
+            pushed = workers.submit(_measured, folder / MEASURED)
             reconstruction = _reconstruct(list(logs.values()), plant.arm, "stepwise", progress)
             model = reconstruction.model
             model.save(folder / "model.json")
@@ -95,8 +97,6 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             runs = [workers.submit(track, scenario, name, {"model": model}) for name in scenario.controllers]
             before_run = workers.submit(track, scenario, "pid_step3", {"model": model}, [undeclared])
             tracking = {name: run.result() for name, run in zip(scenario.controllers, runs, strict=True)}
-            # last in the queue: it has a core while the main process diagnoses and draws
-            pushed = workers.submit(_measured, folder / MEASURED)
             reference = one_shot.result()
         print(eta_table(tracking, paper=True), end="\n\n", flush=True)
         with clock("diagnose", "4/7 measured again: tracing the residual of the second run"):

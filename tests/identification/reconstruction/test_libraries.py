@@ -283,7 +283,7 @@ def test_what_only_the_double_feature_set_knows_asks_for_it() -> None:
 def test_what_a_library_does_not_use_is_said() -> None:
     for options in (
         Options(sparse=Sparse("lasso")),
-        Options(sparse=Sparse(penalty=0.1)),
+        Options(sparse=Sparse("lasso", penalty=0.1)),
         Options(max_order=2),
     ):
         with pytest.warns(InputWarning, match="rigid-body has none, and they are not used"):

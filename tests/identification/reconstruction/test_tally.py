@@ -89,3 +89,8 @@ def test_a_baseline_is_no_better_than_what_is_left_of_all_data() -> None:
     # samples that are no time series have no places
     bare = {key: x for key, x in held.items() if key not in ("reversals", "creeping")}
     assert at_least(bare, whole)["rmse"] == found["rmse"] and "reversals" not in at_least(bare, whole)
+
+
+def test_of_no_sample_nothing_is_scored() -> None:
+    score = Tally({}, np.zeros((0, 2, 2)), 0, {}).score()
+    assert (score.samples, score.overall["rmse"], score.moving["nrmse"]) == (0, [None, None], [None, None])

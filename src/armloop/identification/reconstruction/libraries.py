@@ -248,12 +248,11 @@ def comparison_notes(tried: Sequence[Contender]) -> list[str]:
     """Why the library that was taken was, and what its checks say, a line each."""
     (taken,) = [one for one in tried if one.chosen]
     others = [one for one in tried if not one.chosen]
-    parts = [
-        f"{one.name} {one.error:.2%}" if one.attempt else f"{one.name} not tried ({one.refused})"
-        for one in others
-    ]
+    parts = [_outcome(one) for one in others]
     if np.isfinite(taken.error):
         reason = f"it leaves {taken.error:.2%} (nRMSE) on the blocks that choose the library"
+    elif any(one.attempt for one in others):
+        reason = "the logs are too short to judge it by"
     else:
         reason = "the only one that the logs can determine"
     if any(one.passed and one.error < taken.error for one in others):
@@ -263,3 +262,10 @@ def comparison_notes(tried: Sequence[Contender]) -> list[str]:
         if one.checks is not None and not one.passed and one.error < taken.error:
             notes.append(f"{one.name} leaves less but is no arm: {'; '.join(one.checks.faults())}")
     return notes
+
+
+def _outcome(one: Contender) -> str:
+    """What became of a library that was not taken."""
+    if one.attempt is None:
+        return f"{one.name} not tried ({one.refused})"
+    return f"{one.name} {one.error:.2%}" if np.isfinite(one.error) else f"{one.name} not judged"

@@ -106,8 +106,9 @@ class Tally:
         return Tally.of(every, model, sorter, seconds=seconds)
 
     def score(self) -> Score:
-        """Score of all held-out samples."""
-        return score_of_sums(np.sum(list(self.sums.values()), axis=0), self.samples)
+        """Score of all held-out samples; where there are none, errors of nothing."""
+        nothing = np.zeros((2, 3, self.blocks.shape[2]))
+        return score_of_sums(sum(self.sums.values(), nothing), self.samples)
 
     def baseline(self) -> dict[str, Any]:
         """What the model leaves, per joint: of the condition that it explains worst.

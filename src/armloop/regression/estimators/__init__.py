@@ -33,15 +33,15 @@ def _listed(choose: Callable[[Problem], Array], **flags: bool) -> type[Estimator
 LISTED: dict[str, type[Estimator]] = {
     kind.name: kind
     for kind in (
-        _listed(evidence, least_squares=True, needs_parts=False),
+        _listed(evidence, least_squares=True, needs_parts=False, has_penalty=False),
         _listed(lasso, shrinks=True),
         _listed(debiased_lasso, least_squares=True),
         _listed(adaptive_lasso, shrinks=True),
         _listed(thresholded, least_squares=True),
         _listed(stlsq),
         _listed(sr3),
-        _listed(stability, least_squares=True),
-        _listed(least_squares, needs_parts=False, keeps_all=True),
+        _listed(stability, least_squares=True, has_penalty=False),
+        _listed(least_squares, needs_parts=False, keeps_all=True, has_penalty=False),
     )
 }
 #: All estimators by name; a user's own are installed under the entry points ``armloop.estimators``.

@@ -19,6 +19,7 @@ class Estimator:
         shrinks: whether they are smaller than that.
         needs_parts: whether held-out parts of the data change the estimate.
         keeps_all: whether no term is left out, so that there is no :class:`Problem`.
+        has_penalty: whether a penalty, or a threshold, is one of its parameters.
     """
 
     name: ClassVar[str]
@@ -26,6 +27,7 @@ class Estimator:
     shrinks: ClassVar[bool] = False
     needs_parts: ClassVar[bool] = True
     keeps_all: ClassVar[bool] = False
+    has_penalty: ClassVar[bool] = True
 
     def choose(self, problem: Problem) -> Array:
         """(p,) coefficients of the problem's columns, zero where a term is left out.
