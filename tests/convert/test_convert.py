@@ -13,7 +13,10 @@ from synthetic import three_axis
 from armloop.cli import main
 from armloop.convert import Answers, Mapping, QuantityMap, TimeMap, convert
 from armloop.convert.joints import match
+from armloop.convert.suggest import suggested
+from armloop.convert.table import read_table
 from armloop.data.log import MotionLog, read_log
+from armloop.data.tables import write_columns
 from armloop.util.errors import InputError, InputWarning
 
 TORQUE = Answers(tau_unit="N*m")
@@ -202,6 +205,17 @@ def test_matlab_and_numpy_arrays(tmp_path, log, sideways):
         found = convert([tmp_path / name], answers=Answers("N*m", None, "rad"))
         assert_same(found.log, log, 1e-12)
         np.testing.assert_allclose(found.log.time, log.time, atol=1e-12)
+
+
+def test_a_motion_logs_own_header_has_no_place_for_units(tmp_path, log):
+    turned = {"q": np.rad2deg(log.q), "v": np.rad2deg(log.v)}
+    given = {f"{kind}{j + 1}": x[:, j] for kind, x in turned.items() for j in range(log.joints)}
+    write_columns(tmp_path / "deg.csv", {**log.columns(), **given})
+    found = convert([tmp_path / "deg.csv"], answers=Answers(angle_unit="deg"))
+    assert_same(found.log, log, 1e-12)
+    write_columns(tmp_path / "ms.csv", {**log.columns(), "time": 1e3 * log.time})
+    _, unsure = suggested(read_table(tmp_path / "ms.csv"), None)
+    assert unsure == {"time": "v agrees with the rate of q if the unit is ms, not s"}
 
 
 def test_sources_follow_each_other_as_runs(tmp_path, log):

@@ -270,7 +270,7 @@ def test_a_motion_log_that_is_not_in_si_units_is_not_called_sure(tmp_path, log, 
     path, place, out = tmp_path / "t.csv", tmp_path / "map.yaml", tmp_path / "o.csv"
     write(path, ["time", *per_joint("q{}", "v{}", "tau{}")], [1e6 * log.time, log.q, log.v, log.tau], ",")
     assert main(["convert", str(path), "--suggest", "--map", str(place)]) == 0
-    assert "q changes 1e-06 times as fast as v says" in capsys.readouterr().out
+    assert "v agrees with the rate of q if the unit is us, not s" in capsys.readouterr().out
     place.write_text(place.read_text().replace("unit: s}", "unit: us}"))
     assert main(["convert", str(path), "--map", str(place), "--out", str(out)]) == 0
     np.testing.assert_allclose(read_log(out).time, log.time, atol=1e-9)

@@ -33,6 +33,17 @@ def of_samples(given: Any) -> Any:
     return SimpleNamespace(samples=given, model=SimpleNamespace(history={}, arm=SimpleNamespace(n=joints)))
 
 
+def test_a_joint_that_never_crept_may_stick_at_more_than_its_sliding_level() -> None:
+    def of(**history: Any) -> list[float]:
+        model: Any = SimpleNamespace(history=history, arm=SimpleNamespace(n=3))
+        return innovations.stiction(model).tolist()  # type: ignore[no-any-return]
+
+    ranges = [[1.0] * 3, [2.0] * 3, [9.0] * 3, [0.0] * 3]
+    # five hundredths of the largest speed, or slower, is creep
+    assert of(range=ranges, slowest=[0.02, 0.1, 0.11]) == [1.2, 1.2, 1.8]
+    assert of(range=ranges) == of(slowest=[0.5] * 3) == [1.2] * 3
+
+
 def test_a_fast_reversal_is_no_rest_and_a_standstill_is() -> None:
     turning = np.linspace(-2.0, 2.0, 200)
     near = (

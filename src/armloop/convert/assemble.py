@@ -129,7 +129,7 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     where = str(recording.path)
     joints, asked = mapping.n, []
     tau, q, v = mapping.tau, mapping.q, mapping.v
-    own = recording.kind == "motion log"  # whose header has no place for the unit of tau
+    own = recording.kind == "motion log"  # whose header has no place for units
     if answers.drive_gains is not None:
         # Gains are given base to tip, as everywhere; the map's lists are in the order of its columns, a gripper's too.
         named = arm is not None and mapping.joints is not None
@@ -149,14 +149,15 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
         tau = replace(tau, unit=answers.tau_unit if own else _said(tau.unit, answers.tau_unit))
     if answers.angle_unit is not None:
         told = {str(canonical(unit, "q")) for unit in q.units() if unit}
-        if None not in q.units() and told & {"rad", "deg"} - {answers.angle_unit}:
+        if not own and None not in q.units() and told & {"rad", "deg"} - {answers.angle_unit}:
             raise LogError(
                 f"{where}: --angle-unit {answers.angle_unit}, but the {recording.kind} says itself that q is in "
                 f"{', '.join(sorted(told))}; leave the option out, or write the right unit in a --map"
             )
-        q = replace(q, unit=_said(q.unit, answers.angle_unit))
+        q = replace(q, unit=answers.angle_unit if own else _said(q.unit, answers.angle_unit))
         if v is not None:
-            v = replace(v, unit=_said(v.unit, RATES[answers.angle_unit]))
+            rate = RATES[answers.angle_unit]
+            v = replace(v, unit=rate if own else _said(v.unit, rate))
     if None in tau.units():
         asked.append(
             "what tau holds (--tau-unit N*m; --tau-unit A; or --drive-gains k1,..,kn in N·m/A"

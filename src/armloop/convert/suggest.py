@@ -56,9 +56,12 @@ def _contradiction(recording: Recording, mapping: Mapping, v: QuantityMap) -> di
     clock, unit = mapping.time.column, canonical(mapping.time.unit or "", "time")
     if clock is None or unit is None:
         return {}
-    ratio = rate_ratio(recording.columns[clock], recording, mapping.q, v) / FACTORS["time"][unit]
+    bare = rate_ratio(recording.columns[clock], recording, mapping.q, v)
+    ratio = bare / FACTORS["time"][unit]
     if ratio == 0 or 0.7 < ratio < 1.4:
         return {}
+    if right := time_unit(bare):
+        return {"time": f"v agrees with the rate of q if the unit is {right}, not {unit}"}
     return {"v": f"in these units q changes {ratio:.3g} times as fast as v says; is each of the units right?"}
 
 

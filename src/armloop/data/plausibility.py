@@ -163,7 +163,7 @@ def _degrees(log: Recorded) -> Iterator[Finding]:
             yield Finding(
                 f"columns q{j + 1}, v{j + 1}",
                 f"reach {farthest:.3g} and {fastest:.3g}, more than any arm's joint in rad (m) and rad/s (m/s); "
-                "convert degrees (mm) to SI units",
+                "convert degrees (mm) to SI units: armloop convert --angle-unit deg",
             )
 
 

@@ -69,11 +69,17 @@ def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect
         friction = friction + added.torque(evidence.context)
     bare = residual + smooth(samples, friction)
     size = np.abs(residual) - unsure
-    size = np.maximum(np.where(rest, np.minimum(size, np.abs(bare) - _STICTION * unsure), size), 0.0)
+    size = np.maximum(np.where(rest, np.minimum(size, np.abs(bare) - stiction(model) * unsure), size), 0.0)
     if evidence.unknown is not None:
         size = np.where(evidence.unknown, 0.0, size)
     sign = np.sign(np.where(rest, bare, residual))
     return sign * size / deviations(evidence, residual), rest
+
+
+def stiction(model: ReconstructedModel) -> Array:
+    """(n,) how many times its sliding level a joint at rest can hold: more, where it never crept in its training."""
+    slowest = np.asarray(model.history.get("slowest") or 0.0)
+    return np.where(slowest > CREEPING * fastest(model), 1 + _UNSURE, _STICTION)
 
 
 def at_rest(evidence: Evidence) -> Mask:
