@@ -107,7 +107,10 @@ def test_so_few_logs_that_no_alarm_is_possible_are_not_called_unchanged(
     text = page.read_text(encoding="utf-8")
     assert "Of no arm there is enough operation yet" in text and "has changed" not in text
     assert main([*arguments, "--logs", *map(str, logs), "--arm", "elbow"]) == 2
-    assert "--arm elbow: there is no such arm in the store; its arms are healthy" in capsys.readouterr().err
+    assert (
+        "--arm elbow: there is no such arm among the logs or in the store; there are healthy"
+        in capsys.readouterr().err
+    )
 
 
 def test_how_many_units_an_alarm_takes_heeds_programmes_and_alarms(

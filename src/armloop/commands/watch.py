@@ -84,7 +84,10 @@ def run(options: Watch) -> int:
     diagnosed: list[str] = []
     outcome, counts = None, Counts()
     for places in _batches(sys.stdin) if options.logs == ["-"] else [options.logs]:
-        outcome = watch(options.models, _found(places, options.store), options.store, how, tell)
+        files = _found(places, options.store)
+        if options.arm is not None and options.logs != ["-"]:
+            _require_arm(options.arm, files, options.store)
+        outcome = watch(options.models, files, options.store, how, tell)
         if not options.json:
             from armloop.reports.watch_tables import watch_words
 
@@ -132,6 +135,19 @@ def _found(places: Sequence[str], store: str) -> list[LogFile]:
             raise InputError(said)
         warn(said)
     return files
+
+
+def _require_arm(arm: str, files: Sequence[LogFile], store: str) -> None:
+    """Raise ``InputError`` for an arm whose trends nothing will show, before the logs are read."""
+    from pathlib import Path
+
+    from armloop.watch.store import arms_in
+
+    known = {*arms_in(Path(store)), *(file.arm for file in files)}
+    if "" in known or arm in known:  # of a log in no arm's folder a column may tell
+        return
+    names = ", ".join(sorted(known)[:12]) + (", ..." if len(known) > 12 else "")
+    raise InputError(f"--arm {arm}: there is no such arm among the logs or in the store; there are {names}")
 
 
 def _announce(store: str, names: Sequence[str]) -> None:

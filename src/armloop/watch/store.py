@@ -151,7 +151,7 @@ class Store:
 
     def arms(self) -> list[str]:
         """The arms that have logs, sorted."""
-        return sorted(unquote(path.name.removeprefix("arm=")) for path in self.folder.glob("sums/arm=*"))
+        return arms_in(self.folder)
 
     def running(self, arm: str) -> Path:
         """Where the running state of an arm's tests lies."""
@@ -220,6 +220,11 @@ def placing(path: Path) -> Iterator[Path]:
 def _write(path: Path, value: dict[str, Any]) -> None:
     with placing(path) as draft:
         draft.write_text(json.dumps(value, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def arms_in(folder: Path) -> list[str]:
+    """The arms that have logs in the folder of a store, if it is one, sorted."""
+    return sorted(unquote(path.name.removeprefix("arm=")) for path in folder.glob("sums/arm=*"))
 
 
 def _partition(arm: str) -> str:
