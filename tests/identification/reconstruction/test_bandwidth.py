@@ -63,8 +63,8 @@ def test_a_log_of_several_runs_tells_what_they_tell_as_logs() -> None:
     assert len(joined.runs()) == 3
     apart, together = (choose_bandwidth(logs, three_axis(), TEN_HZ) for logs in (runs, [joined]))
     assert together.cutoff_hz == apart.cutoff_hz
-    # what is no measurement is told by the log it is in
-    np.testing.assert_allclose(together.trials, apart.trials, rtol=1e-3)
+    # what is no measurement, and how late v is, is told by the log that a run is in
+    np.testing.assert_allclose(together.trials, apart.trials, rtol=2e-2)
 
 
 def test_runs_that_are_left_out_are_said() -> None:
