@@ -16,6 +16,7 @@ from armloop.convert.recording import Array, Recording, some
 from armloop.convert.units import CURRENTS, FACTORS, RATES, canonical, time_unit
 from armloop.data.header import JOINT_COLUMN
 from armloop.data.log import FEWEST_SAMPLES, GAP_PERIODS, MotionLog, unchecked_log
+from armloop.data.plausibility import LARGEST_Q
 from armloop.robot.arm import Arm
 from armloop.util.errors import LogError
 
@@ -149,6 +150,7 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
         tau = replace(tau, unit=answers.tau_unit if own else _said(tau.unit, answers.tau_unit))
     if answers.angle_unit is not None:
         told = {str(canonical(unit, "q")) for unit in q.units() if unit}
+        own &= _no_radians(recording, q)
         if not own and None not in q.units() and told & {"rad", "deg"} - {answers.angle_unit}:
             raise LogError(
                 f"{where}: --angle-unit {answers.angle_unit}, but the {recording.kind} says itself that q is in "
@@ -179,6 +181,12 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     if mapping.time.column is not None and (unit is None or unit == UNSAID):
         unit = _time_unit(recording, mapping, q, v)
     return replace(mapping, time=replace(mapping.time, unit=unit), q=q, tau=tau, v=v)
+
+
+def _no_radians(recording: Recording, q: QuantityMap) -> bool:
+    """Whether positions are more than any joint's in rad (m): no motion log has them, whatever its header says."""
+    columns = [recording.columns[name] for name in q.names() if name in recording.columns]
+    return max((float(np.abs(column).max()) for column in columns), default=0.0) > LARGEST_Q
 
 
 def _told(tau: QuantityMap) -> set[str]:

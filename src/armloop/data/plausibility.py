@@ -27,7 +27,7 @@ from armloop.util.arrays import TINY, Array
 # No joint of an arm turns beyond, moves faster, accelerates harder or bears more (rad, rad/s, rad/s², N·m or A).
 _LARGEST = {"q": 1e4, "v": 1e3, "vdot": 1e6, "tau": 1e6}
 # A joint that turns beyond the first at more than the second is not in rad and rad/s (m and m/s).
-_LARGEST_Q, _LARGEST_V = 30.0, 20.0
+LARGEST_Q, _LARGEST_V = 30.0, 20.0
 # A spike is no longer than so many samples, and so many times as large as all else in so many samples at least.
 _SPIKE_SAMPLES, _SPIKE_RATIO, _FEWEST = 3, 10.0, 20
 _SPIKE_LEAST = {"q": 0.1, "v": 1.0, "vdot": 100.0, "tau": 1.0}
@@ -159,7 +159,7 @@ def _spikes(log: Recorded) -> Iterator[Finding]:
 def _degrees(log: Recorded) -> Iterator[Finding]:
     for j in range(log.q.shape[1]):
         farthest, fastest = np.abs(log.q[:, j]).max(), np.abs(log.v[:, j]).max()
-        if farthest > _LARGEST_Q and fastest > _LARGEST_V:
+        if farthest > LARGEST_Q and fastest > _LARGEST_V:
             yield Finding(
                 f"columns q{j + 1}, v{j + 1}",
                 f"reach {farthest:.3g} and {fastest:.3g}, more than any arm's joint in rad (m) and rad/s (m/s); "
