@@ -53,7 +53,7 @@ FAULTS: dict[str, tuple[tuple[object, ...], str]] = {
                 f"{joints(('jl', 'revolute', 'base', 'l'), ('jr', 'revolute', 'base', 'r'))}</robot>"
             ),
         ),
-        r"bad\.urdf: not a serial arm: 2 moving joints follow",
+        r"bad\.urdf: not a serial arm: 2 moving joints follow the base \(jl, jr\)",
     ),
     "a planar joint": (
         (

@@ -122,6 +122,16 @@ def test_the_same_arm_always_gives_the_same_sums():
     np.testing.assert_allclose(first.grouping, other_motion.grouping, atol=1e-9)
 
 
+@pytest.mark.parametrize(("off", "more"), [(5e-8, False), (1e-3, True)])
+def test_axes_written_to_seven_digits_are_parallel(off: float, more: bool) -> None:
+    poses, kinds = [(0.0, 0.0, 0.1), (0.3, 0.0, 0.0), (0.3, 0.0, 0.0)], ["revolute"] * 3
+    counts = [
+        BaseParameters.of_arm(an_arm(kinds, poses, [(0, 0, 1), (lean, 0, 1), (0, 0, 1)])).count
+        for lean in (0.0, off)
+    ]
+    assert (counts[1] > counts[0]) == more
+
+
 def test_names_of_full_parameters():
     assert parameter_names(2, rotors=True)[::10] == ["m1", "m2", "J1"]
 

@@ -173,6 +173,13 @@ def test_a_library_of_more_candidates_than_independent_torques_is_not_tried() ->
     )
 
 
+def test_what_no_block_judges_is_said_to_be_so() -> None:
+    made: Any = SimpleNamespace()
+    taken = Contender(named("rigid-body"), made, nrmse=(None, None), chosen=True)
+    note, *_ = comparison_notes([taken, Contender(named("lagrangian"), made, nrmse=(None, None))])
+    assert note == "library rigid-body: the logs are too short to judge it by; lagrangian not judged"
+
+
 def test_blocks_choose_the_library_or_judge_the_model_and_neither_is_fitted(logs: list[MotionLog]) -> None:
     samples = preprocess(logs, three_axis_conditioning())
     chunk = Chunk.of(samples, OPTIONS)
