@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from synthetic import sines
 
-from armloop.data.dropouts import repaired
+from armloop.data.dropouts import mended, repaired
 from armloop.data.filters import filter_reach
 from armloop.data.log import MotionLog, recorded
 from armloop.data.motion import Motion
@@ -346,12 +346,16 @@ def test_a_late_speed_is_moved_run_by_run_and_never_beyond_its_end() -> None:
 
 def test_part_of_a_run_is_conditioned_as_in_the_whole() -> None:
     log = filtered_by_its_driver(sines(np.arange(0, 20, 0.004)), 30.0, 0.5)
-    log.tau[2050] += 50.0
+    log.tau[[2050, 2119], 1] += 50.0
     part, alone = (cut(slice(2000, 2120)) for cut in (log.stretch, log.select))
     # half a second says nothing of a lag, and less of what lies far out
     assert alone.velocity_lag == 0.0
     assert part.velocity_lag == log.velocity_lag > 0.003
     whole, own = (preprocess([x], TEN_HZ) for x in (log, part))
+    # what lies beside the last of its rows is in the whole alone
+    mended_whole, mended_part, mended_alone = (mended(x.record).tau for x in (log, part, alone))
+    np.testing.assert_array_equal(mended_part, mended_whole[2000:2120])
+    assert (mended_alone[-1] != mended_part[-1]).any()
     # but for what the filter's ends cost
     inside = np.searchsorted(whole.motion.time, own.motion.time[8:-8] - 1e-6)
     for name, near in (("q", 0.01), ("v", 0.3)):

@@ -222,6 +222,18 @@ class TestInnovations:
         found = self.found(monkeypatch, [0.0] * 4, residual, [True] * 4, held=held, rows=none)
         # the smaller of 3 - 1 and |residual + friction| - 1.2, with the sign of the latter
         np.testing.assert_allclose(found, [0.9, 0.4, 1.0, -0.9])
+        # nor is it known how much a joint holds that never crept in its training
+        ranges = [[1.0], [2.0], [9.0], [0.0]]
+        found = self.found(
+            monkeypatch,
+            [0.0],
+            [3.0],
+            [True],
+            held=[0.0],
+            rows=False,
+            history={"range": ranges, "slowest": [0.2]},
+        )
+        np.testing.assert_allclose(found, (3 - 1.8) / 2)
         # of what is known beside the model, what rubs is held, too: as much more, and with its torque there or without
         rubs, pulls = (
             SimpleNamespace(
