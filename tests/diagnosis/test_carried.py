@@ -18,6 +18,7 @@ from armloop.diagnosis import Diagnosis, diagnose
 from armloop.diagnosis import carried as carrying
 from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.carried import account_with_load, find_carried
+from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.next_run import next_run
 from armloop.laws.effects import Context, effect, hypotheses
@@ -279,6 +280,30 @@ def test_a_load_at_the_cost_of_other_joints_is_none(
     ((loaded, plain, least),) = asked
     np.testing.assert_array_equal(loaded.rows, plain.rows)
     assert loaded.error < plain.error / 4 and (least >= 0.4 * plain.rows).all()
+
+
+def test_what_is_left_of_samples_that_a_load_leaves_out_speaks_for_none(
+    accounts: tuple[Evidence, Account, Account | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A load must explain what is left elsewhere: then nothing is searched anew for one that came and went in these."""
+    whole, account, _ = accounts
+    found = find_carried(without(whole, []))
+    assert found is not None
+    monkeypatch.setattr(carrying, "find_carried", lambda _: found)
+    searched: list[Any] = []
+
+    def beside(*given: Any) -> Any:
+        searched.append(given)
+        raise InterruptedError
+
+    monkeypatch.setattr(carrying, "_beside", beside)
+    with pytest.raises(InterruptedError):
+        account_with_load(whole, account, silent, 1)
+    load, unknown = found
+    size = np.abs(account.remaining()).sum(axis=1)
+    rest = np.broadcast_to((size > np.quantile(size, 0.5))[:, None], unknown.shape)
+    monkeypatch.setattr(carrying, "find_carried", lambda _: (load, unknown | rest))
+    assert account_with_load(whole, account, silent, 1) is None and len(searched) == 1
 
 
 def test_the_account_with_a_load_is_one_of_the_model_as_it_is(

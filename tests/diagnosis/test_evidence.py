@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import rigid_torque, three_axis
+from rubbing_arm import model_with_baseline, motion_of, torque
+from synthetic import measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess, smooth
 from armloop.diagnosis import evidence
 from armloop.diagnosis.evidence import Evidence
+from armloop.laws.effects.encoder_offset import EncoderOffset
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
@@ -84,6 +86,29 @@ def test_a_models_own_errors_are_weighted_like_the_rows(monkeypatch: pytest.Monk
     expected = [errors[0, 0] / 0.5, errors[2, 0] / 0.5, errors[2, 1] / 4, errors[3, 1] / 4]
     for _ in range(2):  # the second time what is kept
         np.testing.assert_array_equal(Evidence._model_errors.func(own), expected)  # type: ignore[attr-defined]
+
+
+def test_columns_between_the_nodes_of_a_mesh_are_interpolated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of however many encoder offsets, those at the nodes around them alone ask the model."""
+    model = model_with_baseline()
+    samples = preprocess(
+        [measured(motion_of(3, 5.0), torque(motion_of(3, 5.0)), 3, 0.01)], model.conditioning
+    )
+    offset = EncoderOffset(2)
+    given = Evidence.of(model, samples, [offset])
+    shapes = np.linspace(0.0411, 0.0587, 30)
+    exact = [smooth(samples, offset.columns(given.context, x))[given.independent] for x in shapes]
+    asked: list[float] = []
+    columns = EncoderOffset.columns
+
+    def ask(self: EncoderOffset, context: Any, shape: float) -> Any:
+        asked.append(shape)
+        return columns(self, context, shape)
+
+    monkeypatch.setattr(EncoderOffset, "columns", ask)
+    off = [np.abs(given.smoothed(offset, x) - each).max() for x, each in zip(shapes, exact, strict=True)]
+    assert asked == pytest.approx([0.02, 0.04, 0.06, 0.08])
+    assert max(off) < 1e-6 * np.abs(exact).max()
 
 
 def test_a_joint_has_slid_that_travels_far_enough() -> None:

@@ -147,15 +147,18 @@ def test_an_event_is_what_it_looks_like_without_the_effects(monkeypatch: pytest.
 
 def test_an_account_leaves_what_is_held_out_and_what_events_do_not_explain() -> None:
     """Two rows held out, 3 and 4 units; of an event's two counted rows of 10 N·m at a scale of 5 a quarter is left."""
-    whole: Any = SimpleNamespace(rows=np.array([[True], [True], [True], [False]]))
-    evidence: Any = SimpleNamespace(scale=np.array([5.0]), rows=np.zeros((4, 1), dtype=bool))
-    evidence.rows[0] = True
+    whole: Any = SimpleNamespace(rows=np.array([[True], [True], [True], [True], [False]]))
+    evidence: Any = SimpleNamespace(scale=np.array([5.0]), rows=np.zeros((5, 1), dtype=bool))
+    evidence.rows[:2] = True
     outcome: Any = SimpleNamespace(after=SimpleNamespace(held_out=np.array([3.0, 4.0])))
-    event: Any = SimpleNamespace(share=0.75, rows=np.array([False, True, True, True]))
-    account = accounts.Account(whole, [event], evidence, outcome, None)
-    assert account.left(np.full((4, 1), 10.0)) == pytest.approx(9 + 16 + 0.25 * (4 + 4))
+    event: Any = SimpleNamespace(share=0.75, rows=np.array([False, False, True, True, True]))
+    account, residual = accounts.Account(whole, [event], evidence, outcome, None), np.full((5, 1), 10.0)
+    assert account.left(residual) == pytest.approx(9 + 16 + 0.25 * (4 + 4))
     # taken back, its samples are nobody's: all that is left there counts
-    assert replace(account, contacts=[]).left(np.full((4, 1), 10.0)) == pytest.approx(9 + 16 + 4 + 4)
+    assert replace(account, contacts=[]).left(residual) == pytest.approx(9 + 16 + 4 + 4)
+    some = np.array([[False], [True], [True], [False], [True]])
+    assert account.left(residual, some) == pytest.approx(16 + 0.25 * 4)
+    assert replace(account, contacts=[]).left(residual, some) == pytest.approx(16 + 4)
 
 
 @pytest.mark.parametrize(

@@ -124,16 +124,20 @@ class Account:
         again = find_contacts(self.whole, fewer.remaining(), outcome.added())
         return replace(fewer, contacts=[contact for contact in again if (contact.rows & known).any()])
 
-    def left(self, residual: Array) -> float:
+    def left(self, residual: Array, among: Mask | None = None) -> float:
         """Squared error, weighted, of the whole run: held-out, and what the events leave of their own samples.
 
         Samples that nothing was fitted to, and that are no event's, count with the residual.
+
+        Args:
+            among: (N, n) samples to count; all by default.
         """
-        evidence, total = self.evidence, float((self._held_out() ** 2).sum())
+        evidence, rows = self.evidence, self.whole.rows if among is None else self.whole.rows & among
+        total = float((self._held_out()[rows[evidence.rows]] ** 2).sum())
         weighted = (residual / evidence.scale) ** 2
-        others = self.whole.rows & ~evidence.rows
+        others = rows & ~evidence.rows
         for contact in self.contacts:
-            mine = self.whole.rows & contact.rows[:, None]
+            mine = rows & contact.rows[:, None]
             total += (1 - contact.share) * float(weighted[mine].sum())
             others &= ~mine
         return total + float(weighted[others].sum())

@@ -57,8 +57,7 @@ def account_with_load(
     if not load.plausible(whole.model.arm, known.fit.parameters[0]):
         return None
     # beside what was found it must explain most of what that leaves; only then is all else searched anew
-    least = (1 - MOSTLY) * _excess(account)
-    if float(_with(plain, load, account).fit.score.excess.sum()) > least:
+    if not _explains_most(float(_with(plain, load, account).fit.score.excess.sum()), account, plain.rows):
         return None
     other = _beside(whole, known, unknown, progress, jobs)
     for _ in range(ROUNDS):
@@ -73,7 +72,7 @@ def account_with_load(
         other = _beside(whole, _with(plain, load, other), unknown, progress, jobs)
         if before == {effect.place for effect in other.outcome.after.effects}:
             break
-    if _excess(other) > least:
+    if not _explains_most(_excess(other, other.whole.rows), account, other.whole.rows):
         return None
     loaded = _loaded(whole, load, other)
     return None if _at_the_cost_of_others(account, loaded) else loaded
@@ -84,9 +83,15 @@ def _known_part(whole: Evidence, unknown: Mask) -> Evidence:
     return without(whole.only(whole.rows & ~unknown), [])
 
 
-def _excess(account: Account) -> float:
-    """Squared error, weighted, that an account leaves of its whole run beyond the baseline."""
-    return account.left(account.remaining()) - float(account.whole.rows.sum())
+def _excess(account: Account, rows: Mask) -> float:
+    """Squared error, weighted, that an account leaves of some (N, n) samples of its run beyond the baseline."""
+    return account.left(account.remaining(), rows) - float((account.whole.rows & rows).sum())
+
+
+def _explains_most(left: float, account: Account, rows: Mask) -> bool:
+    """Whether an excess is less by most of what an account without a load leaves of the same (N, n) samples."""
+    before = _excess(account, rows)
+    return before > 0 and left <= (1 - MOSTLY) * before
 
 
 def _loaded(whole: Evidence, load: CarriedLoad, other: Account) -> Account:

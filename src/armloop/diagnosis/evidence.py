@@ -25,6 +25,7 @@ from armloop.laws.effects.base import Place
 from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Index, Mask, stretches
+from armloop.util.interpolation import cubic_nodes
 
 #: Number of folds.
 FOLDS = 2
@@ -188,8 +189,14 @@ class Evidence:
 
     def smoothed(self, effect: Effect, shape: float) -> Array:
         """(M, p) columns of an effect on its joint, or (M, n, p) on all, through the run's filter, at
-        :attr:`independent` samples; computed once.
+        :attr:`independent` samples; computed once, of a nonlinear parameter that has a mesh at its nodes alone.
         """
+        if effect.mesh is None:
+            return self._smoothed_at(effect, shape)
+        nodes = cubic_nodes(shape, effect.mesh)
+        return np.asarray(sum(weight * self._smoothed_at(effect, node) for node, weight in nodes))
+
+    def _smoothed_at(self, effect: Effect, shape: float) -> Array:
         kept = self._of_model if effect.needs_model else self._of_motion
         return kept.of(
             effect.place,

@@ -154,6 +154,7 @@ class Effect(ABC):
         parameters: what it calls its numbers; as many are free (``complexity``) unless it says otherwise.
         needs_inertial: whether its columns are made of the known model's inertial parameters.
         needs_model: whether its columns depend on anything the known model says, not on the motion alone.
+        mesh: columns of a nonlinear parameter between multiples of this may be interpolated; None where they may not.
         load: whether its torque passes the joint's bearings and gears, so that friction grows with it.
         memory: whether it depends on the path or the time, not only on q, v and vdot.
         of_time: whether it depends on the time since the start of a run; to a controller the start is long ago.
@@ -177,6 +178,7 @@ class Effect(ABC):
     complexity: ClassVar[int] = 1
     needs_inertial: ClassVar[bool] = False
     needs_model: ClassVar[bool] = True
+    mesh: ClassVar[float | None] = None
     load: ClassVar[bool] = False
     event: ClassVar[bool] = False
     searched: ClassVar[bool] = True
