@@ -111,6 +111,22 @@ def test_columns_between_the_nodes_of_a_mesh_are_interpolated(monkeypatch: pytes
     assert max(off) < 1e-6 * np.abs(exact).max()
 
 
+def test_what_is_tried_is_asked_once_of_a_model() -> None:
+    """A model that knows more is another."""
+    asked: list[Any] = []
+    law: Any = SimpleNamespace(
+        place=("a", 1, None), shapes=lambda context: asked.append(context) or [1.0, 2.0]
+    )
+    model = model_with_baseline()
+    samples = preprocess(
+        [measured(motion_of(3, 5.0), torque(motion_of(3, 5.0)), 3, 0.01)], model.conditioning
+    )
+    given = Evidence.of(model, samples, [])
+    assert given.tried(law) == given.tried(law) == (1.0, 2.0) and asked == [given.context]
+    again = given.knowing([])
+    assert again.tried(law) == (1.0, 2.0) and asked == [given.context, again.context]
+
+
 def test_a_joint_has_slid_that_travels_far_enough() -> None:
     moving = np.ones((6, 3), dtype=bool)
     moving[3] = False

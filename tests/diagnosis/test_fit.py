@@ -14,11 +14,19 @@ from armloop.laws.effects import effect
 from armloop.regression.clustered import clustered_covariance
 
 
+def tried(effect: Any) -> Any:
+    """As an evidence tells it."""
+    return tuple(effect.shapes(None))
+
+
 class Rows:
     """An evidence of one joint and four samples whose column is the nonlinear parameter itself."""
 
     def __init__(self) -> None:
-        self.context, self.asked = None, list[float]()
+        self.asked = list[float]()
+
+    def tried(self, effect: Any) -> Any:
+        return tried(effect)
 
     def columns(self, effect: Any, value: float) -> Any:
         del effect
@@ -67,7 +75,7 @@ def test_what_is_judged_is_the_law_at_some_nonlinear_parameter() -> None:
     X = np.random.default_rng(3).normal(size=(40, 2))
     for ratio, nearest in ((0.2, 0.2), (-0.25, -0.25), (4.0, 0.3), (-4.0, -0.3)):
         evidence: Any = SimpleNamespace(
-            context=None,
+            tried=tried,
             columns=lambda effect, value: X[:, None],
             stack=lambda residual, columns: SimpleNamespace(
                 X=columns[0][:, 0], y=residual, fold=np.zeros(40, dtype=int)
@@ -82,9 +90,9 @@ def test_what_is_judged_is_the_law_at_some_nonlinear_parameter() -> None:
 
 
 def test_a_nonlinear_parameter_is_not_refined_beyond_what_is_tried() -> None:
-    evidence: Any = SimpleNamespace(context=None)
-    for tried, inside in (((0.0,), 5.0), ((1.0, 2.0), 2.0), ((6.0, 7.0, 9.0), 6.0)):
-        assert fit._bounded(shaped(None, tried), evidence, 5.0) == inside
+    evidence: Any = SimpleNamespace(tried=tried)
+    for values, inside in (((0.0,), 5.0), ((1.0, 2.0), 2.0), ((6.0, 7.0, 9.0), 6.0)):
+        assert fit._bounded(shaped(None, values), evidence, 5.0) == inside
 
 
 def test_what_blocks_and_cells_have_in_common_counts_once() -> None:

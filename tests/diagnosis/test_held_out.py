@@ -148,6 +148,26 @@ def test_a_search_dealt_over_processes_finds_the_same_to_the_bit(monkeypatch):
     np.testing.assert_array_equal(one.after.held_out, three.after.held_out)
 
 
+def test_the_same_is_tried_once_however_many_searches_ask(monkeypatch):
+    """Without an effect, or beside others, a search goes back to what another has tried; of other samples it is new."""
+    evidence, _, _ = slow_friction_in_one_fold(2.0)
+    few = [effect("viscous_friction", joint) for joint in (1, 2)]
+    monkeypatch.setattr("armloop.diagnosis.trials.hypotheses", lambda arm: few)
+    told = []
+    with Hypotheses(evidence, 1) as panel:
+        for known in (
+            Known.of(evidence),
+            Known.of(evidence),
+            Known.of(evidence, few[:1], [Shape.fixed(0.0)]),
+        ):
+            answer = panel.tried(known, told.append)
+            assert panel.tried(known, told.append) is answer
+        part = evidence.only(evidence.rows & (evidence.blocks != 1)[:, None])
+        others = panel.tried(Known.of(part), told.append)
+    assert len(told) == 3 * len(few)
+    assert [t.effect for t in others] == few and others[0].score.error < answer[0].score.error
+
+
 def test_an_effect_is_as_clear_as_its_clearest_coefficient_or_all_together_by_their_stated_errors():
     evidence, _, residual = slow_friction_in_one_fold(2.0)
     residual = residual + 0.01 * np.random.default_rng(5).normal(size=residual.shape)

@@ -133,7 +133,9 @@ class TestTrials:
         monkeypatch.setattr(trials, "_best_shape", lambda known, effect, shapes: chosen)
         rows = np.zeros((4, 2), dtype=bool)
         rows[2, 0] = True
-        evidence: Any = SimpleNamespace(rows=rows, context=None, model=SimpleNamespace(arm=None))
+        evidence: Any = SimpleNamespace(
+            rows=rows, tried=lambda effect: effect.shapes(None), model=SimpleNamespace(arm=None)
+        )
         # what was known before is nothing beside it, and may be of either sign
         other: Any = SimpleNamespace(
             plausible=lambda arm, parameters: False, estimates=lambda arm, free, spread, value: {}
@@ -328,10 +330,10 @@ class TestTrials:
 
 
 def test_a_shape_is_not_refined_beyond_what_is_tried() -> None:
-    effect: Any = SimpleNamespace(shapes=lambda context: [1.0, 3.0, 2.0])
-    evidence: Any = SimpleNamespace(context=None)
+    effect: Any = SimpleNamespace(shapes=[1.0, 3.0, 2.0])
+    evidence: Any = SimpleNamespace(tried=lambda effect: effect.shapes)
     assert [fit._bounded(effect, evidence, x) for x in (0.5, 1.5, 3.5)] == [1.0, 1.5, 3.0]
-    effect.shapes = lambda context: [1.0]
+    effect.shapes = [1.0]
     assert fit._bounded(effect, evidence, 7.0) == 7.0
 
 

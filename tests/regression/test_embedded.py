@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from armloop.regression.embedded import Linear, solve, unit_scale
+from armloop.regression.embedded import RIDGE, Linear, ridge, solve, unit_scale
 from armloop.regression.moments import Moments
 
 
@@ -180,3 +180,12 @@ def test_columns_of_round_off_have_no_scale_and_no_coefficient():
     np.testing.assert_allclose(unit_scale(1e-24 * np.eye(2)), 1e12)
     beta, _, _ = solve(Moments(G, np.array([4.0, 1e-21, 0.5, 0.0]), 10.0, 5.0), [Linear()], [4])
     np.testing.assert_allclose(beta, [1.0, 0.0, 2.0, 0.0], rtol=1e-7)
+
+
+def test_moments_that_rounding_left_indefinite_are_solved_like_others() -> None:
+    """A Cholesky factor they have none; what is left of blocks by subtraction may be such."""
+    G, b = np.array([[1.0, 1.2], [1.2, 1.0]]), np.array([1.0, 2.0])
+    x = ridge(G, b)
+    np.testing.assert_allclose((G + RIDGE * np.eye(2)) @ x, b, rtol=1e-12)
+    G[0, 1] = G[1, 0] = 0.5
+    np.testing.assert_allclose((G + RIDGE * np.eye(2)) @ ridge(G, b), b, rtol=1e-12)

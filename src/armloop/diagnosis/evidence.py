@@ -87,6 +87,7 @@ class Evidence:
     unknown: Mask | None = None
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
+    _tried: dict[Place, tuple[float, ...]] = field(default_factory=dict, repr=False)
 
     @staticmethod
     def of(model: ReconstructedModel, samples: Samples, effects: list[Effect]) -> Evidence:
@@ -114,7 +115,14 @@ class Evidence:
         model = self.model.with_effects(known)
         every = [*(added.effect for added in known), *self.asked]
         context = model.context(self.samples.motion, every)
-        return replace(self, context=replace(context, period=self.context.period), _of_model=_Columns())
+        context = replace(context, period=self.context.period)
+        return replace(self, context=context, _of_model=_Columns(), _tried={})
+
+    def tried(self, effect: Effect) -> tuple[float, ...]:
+        """Values of an effect's nonlinear parameter to try."""
+        if effect.place not in self._tried:
+            self._tried[effect.place] = tuple(effect.shapes(self.context))
+        return self._tried[effect.place]
 
     @cached_property
     def null(self) -> dict[Place, dict[str, Any]]:

@@ -227,7 +227,7 @@ def _solved(problem: _Problem, values: Sequence[float], without: int | None) -> 
 
 def _bounded(effect: Effect, evidence: Evidence, value: float) -> float:
     """A nonlinear parameter, not refined beyond what is tried: there it would stand for another effect."""
-    tried = effect.shapes(evidence.context)
+    tried = evidence.tried(effect)
     return float(np.clip(value, min(tried), max(tried))) if len(tried) > 1 else value
 
 

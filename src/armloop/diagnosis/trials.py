@@ -67,7 +67,7 @@ class Known:
         evidence, current = self.evidence, self.fit
         if not all(evidence.rows[:, j].any() for j in effect.indices):
             return None  # a joint at rest shows nothing
-        shapes = list(effect.shapes(evidence.context))
+        shapes = evidence.tried(effect)
         if not shapes:
             return None
         one = len(shapes) == 1
@@ -103,6 +103,7 @@ class Hypotheses:
         self._bench = _Bench(whole)
         self._number = {effect.place: k for k, effect in enumerate(self._bench.listed)}
         self._team = Team(self._bench, jobs)
+        self._answers: dict[_Task, list[Tried]] = {}
 
     def __enter__(self) -> Hypotheses:
         self._team.__enter__()
@@ -112,18 +113,21 @@ class Hypotheses:
         self._team.__exit__(*raised)
 
     def tried(self, known: Known, tell: Progress) -> list[Tried]:
-        """Trials of all further effects that can be there."""
+        """Trials of all further effects that can be there; of the same samples and effects they are tried once."""
         numbers = (self._number[effect.place] for effect in known.fit.effects)
         task = np.packbits(known.evidence.rows).tobytes(), tuple(zip(numbers, known.fit.shapes, strict=True))
+        if task in self._answers:
+            return self._answers[task]
         self._bench.task, self._bench.known = task, known
         listed, labels = self._bench.listed, ", ".join(effect.label() for effect in known.fit.effects)
         beside = f"beside {labels}: " if labels else ""
         every = self._team.map(
             _tried, task, len(listed), lambda k: tell(f"{beside}{k} of {len(listed)} hypotheses tried")
         )
-        return [
+        self._answers[task] = [
             Tried(effect, *trial) for effect, trial in zip(listed, every, strict=True) if trial is not None
         ]
+        return self._answers[task]
 
 
 class _Bench:
@@ -150,7 +154,7 @@ def _tried(bench: _Bench, task: _Task, k: int) -> tuple[Shape, Score] | None:
     return None if trial is None else (trial.shapes[-1], trial.score)
 
 
-def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
+def _best_shape(known: Known, effect: Effect, shapes: Sequence[float]) -> Shape:
     """The shape whose columns explain most of what the known effects leave on the effect's joints.
 
     Chosen on all blocks for the parameters, and without each fold in turn for judging that fold: on the other
@@ -178,14 +182,14 @@ class _Grid:
         fold: (R,) of each row.
     """
 
-    shapes: list[float]
+    shapes: Sequence[float]
     free: Array
     given: Array
     left: Array
     fold: Index
 
     @staticmethod
-    def of(known: Known, effect: Effect, shapes: list[float]) -> _Grid:
+    def of(known: Known, effect: Effect, shapes: Sequence[float]) -> _Grid:
         n = known.residual.shape[1]
         joints = effect.indices if len(effect.indices) == 1 else range(n)
         columns, held_out, outside, fold = _shape_problem(known, effect, shapes, joints)
@@ -225,7 +229,7 @@ class _Grid:
 
 
 def _shape_problem(
-    known: Known, effect: Effect, shapes: list[float], joints: Iterable[int]
+    known: Known, effect: Effect, shapes: Sequence[float], joints: Iterable[int]
 ) -> tuple[Array, Array, Array, Index]:
     """Of the effect's joints: columns (R, S, p) of every shape, what is left on held-out rows (R,) and after a fit
     outside each fold (FOLDS, R), and the fold of each row.

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import Protocol
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from armloop.regression.moments import Moments, unit_length
 from armloop.util.arrays import Array
@@ -50,11 +52,11 @@ def solve(
     """
     if not effects:
         return np.zeros(0), [], np.zeros((0, 0))
-    edges, found, free = np.cumsum(sizes)[:-1], [], np.eye(len(moments.b))
+    found, free = [], np.eye(len(moments.b))
     # What the motion hardly shows of a body may start anywhere; a stronger ridge starts it near nothing.
     for part in (RIDGE, _STRONG_RIDGE):
         least = ridge(moments.G, moments.b, part)
-        x = [effect.start(own) for effect, own in zip(effects, np.split(least, edges), strict=True)]
+        x = [effect.start(own) for effect, own in zip(effects, _parts(least, sizes), strict=True)]
         beta, J = _embed(effects, x)
         if np.array_equal(beta, least) and np.array_equal(J, free):
             return beta, x, J  # coefficients are the free parameters themselves, and this is the minimum
@@ -68,11 +70,11 @@ def _gauss_newton(
     moments: Moments, effects: Sequence[Embedding], x: list[Array], beta: Array, J: Array
 ) -> tuple[float, Array, list[Array], Array]:
     """Squared error, coefficients, free parameters and derivative at the minimum reached from x, beta and J."""
-    error, edges = moments.squared_error(beta), np.cumsum([len(part) for part in x])[:-1]
+    error, sizes = moments.squared_error(beta), [len(part) for part in x]
     for _ in range(ITERATIONS):
-        step = ridge(J.T @ moments.G @ J, J.T @ (moments.b - moments.G @ beta))
+        here, step = np.concatenate(x), ridge(J.T @ moments.G @ J, J.T @ (moments.b - moments.G @ beta))
         for damping in (1.0, 0.3, 0.1, 0.03):
-            trial = list(np.split(np.concatenate(x) + damping * step, edges))
+            trial = _parts(here + damping * step, sizes)
             new_beta, new_J = _embed(effects, trial)
             new_error = moments.squared_error(new_beta)
             if new_error < error:
@@ -84,6 +86,12 @@ def _gauss_newton(
         if converged:
             break
     return error, beta, x, J
+
+
+def _parts(x: Array, sizes: Sequence[int]) -> list[Array]:
+    """Consecutive parts of so many entries each (np.split takes ten times as long for parts so small)."""
+    ends = list(accumulate(sizes))
+    return [x[end - size : end] for end, size in zip(ends, sizes, strict=True)]
 
 
 def _embed(effects: Sequence[Embedding], x: Sequence[Array]) -> tuple[Array, Array]:
@@ -101,8 +109,11 @@ def _embed(effects: Sequence[Embedding], x: Sequence[Array]) -> tuple[Array, Arr
 def ridge(G: Array, b: Array, part: float = RIDGE) -> Array:
     """(p,) ridge regression on normal equations, the ridge a part of each column's own length."""
     scale = unit_scale(G)
-    scaled = G * np.outer(scale, scale) + part * np.eye(len(G))
-    return np.asarray(scale * np.linalg.solve(scaled, scale * b))
+    scaled = G * scale * scale[:, None]
+    scaled.flat[:: len(G) + 1] += part
+    # Cholesky without the checks of numpy, which take longer than matrices so small
+    _, x, failed = dposv(scaled, scale * b)
+    return np.asarray(scale * (np.linalg.solve(scaled, scale * b) if failed else x))
 
 
 def unit_scale(G: Array) -> Array:
