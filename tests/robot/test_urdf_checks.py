@@ -58,7 +58,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "text for an inertia": (GOOD.replace('ixx="0.03"', 'ixx="big"'), r"<inertia> ixx='big' is not a finite"),
     "a negative inertia": (GOOD.replace('ixx="0.03"', 'ixx="-0.03"'), r"not positive definite: .*-0.03"),
     "an indefinite inertia": (GOOD.replace('ixy="0"', 'ixy="0.2"'), r"<inertia> is not positive definite"),
-    "lower above upper": (GOOD.replace('lower="-2" upper="2"', 'lower="2" upper="-2"'), r"lower=2 is not below upper=-2"),
+    "lower above upper": (GOOD.replace('lower="-2" upper="2"', 'lower="2" upper="-2"'), r"lower=2 is above upper=-2; ex"),
     "lower equal to upper": (GOOD.replace('lower="-2" upper="2"', 'lower="1" upper="1"'), r"--lock j1=1"),
     "a negative velocity": (GOOD.replace('velocity="3"', 'velocity="-3"'), r"<limit> velocity=-3 must be positive"),
     "a negative effort": (GOOD.replace('effort="50"', 'effort="-5"'), r"<limit> effort=-5"),
@@ -98,7 +98,9 @@ WRONG: dict[str, tuple[str, str]] = {
     ),
     "fingers": ("".join([*PARTS[:7], joint("f2", "l2", "fb", "prismatic"), PARTS[8]]), r"2 moving joints follow .*--tip"),
     "a mimic": ("".join(PARTS), r"joint 'finger_b' mimics 'finger_a'.*--lock finger_b=0"),
-    "a loop": (GOOD + joint("back", "l2", "base", "fixed"), r"base link"),
+    "a loop": (GOOD + joint("back", "l2", "base", "fixed"), r"joints 'j2', 'back', 'j1' form a loop"),
+    "a loop beside the base": (GOOD.replace('parent link="base"', 'parent link="l2"'), r"joints 'j2', 'j1' form a loop"),
+    "a mimic of none": ("".join(PARTS).replace('joint="finger_a"', 'joint="x"'), r"mimics 'x', which no joint is called"),
 }  # fmt: skip
 
 
@@ -110,6 +112,38 @@ def test_what_cannot_be_is_refused_with_the_element(tmp_path: Path, fault: str) 
         load_arm(path)
     message = str(caught.value)
     assert message.startswith(f"{path}: ") and "\n" not in message and len(message) < 400
+
+
+def test_infinite_limits_are_none(tmp_path: Path) -> None:
+    body = GOOD.replace('lower="-2" upper="2"', 'lower="-inf" upper="INF"').replace(
+        'effort="50"', 'effort="Infinity"'
+    )
+    (joint, *_) = load_arm(write(tmp_path / "arm.urdf", body)).joints
+    assert (joint.lower, joint.upper, joint.effort, joint.velocity) == (-np.inf, np.inf, np.inf, 3.0)
+    with pytest.raises(ArmError, match="lower=inf is above upper=2"):
+        load_arm(write(tmp_path / "bad.urdf", GOOD.replace('lower="-2"', 'lower="inf"')))
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "iso-8859-1", "utf-8-sig", "utf-8"])
+def test_a_urdf_may_be_in_an_encoding_that_it_declares(tmp_path: Path, encoding: str) -> None:
+    """Blank lines before its declaration do no harm; the arm's own text is in UTF-8, and can be read again."""
+    plain = write(tmp_path / "plain.urdf", GOOD.replace('"j1"', '"gelänk"')).read_text(encoding="utf-8")
+    body = plain[plain.index("<robot") :]
+    declared = {"utf-8-sig": "utf-8", "utf-16-le": "utf-16"}.get(encoding, encoding)
+    path = tmp_path / "arm.urdf"
+    mark = "\ufeff" if encoding == "utf-16-le" else ""
+    path.write_bytes(f'{mark}\n<?xml version="1.0" encoding="{declared}"?>\n{body}'.encode(encoding))
+    arm = load_arm(path)
+    assert arm.joints[0].name == "gelänk"
+    path.write_text(arm.urdf, encoding="utf-8")
+    assert load_arm(path).joints == arm.joints
+
+
+def test_a_robot_has_a_name(tmp_path: Path) -> None:
+    path = write(tmp_path / "arm.urdf", GOOD)
+    path.write_text(re.sub("<robot [^>]*>", "<robot>", path.read_text()))
+    with pytest.raises(ArmError, match=r"<robot> has no name; give it one"):
+        load_arm(path)
 
 
 def test_entities_are_not_expanded_and_bytes_are_checked(tmp_path: Path) -> None:

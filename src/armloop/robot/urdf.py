@@ -5,6 +5,8 @@ Its links and joints are checked by :mod:`armloop.robot.urdf_checks`. Entities a
 
 from __future__ import annotations
 
+import codecs
+import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -23,6 +25,8 @@ from armloop.util.errors import ArmError
 Element = ElementTree.Element
 
 _MOST_BYTES, _MOST_ELEMENTS, _LONGEST_NAME = 8_000_000, 2_000, 128
+_ENCODING = re.compile(rb"""\s*<\?xml[^>]*\sencoding=["']([\w.-]+)["']""")
+_DECLARATION = re.compile(r"^<\?xml.*?\?>", re.DOTALL)
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -68,7 +72,8 @@ def serial_chain(root: Element, path: Path, lock: Mapping[str, float], tip: str 
         mimic = joint.find("mimic")
         if mimic is not None and joint.get("type") in MOVING:
             raise ArmError(
-                f"{path}: joint {name!r} mimics {mimic.get('joint')!r}, a serial arm's joints are free; "
+                f"{path}: joint {name!r} mimics {mimic.get('joint')!r}, "
+                f"{'' if mimic.get('joint') in joints else 'which no joint is called, and '}a serial arm's joints are free; "
                 f"lock it (--lock {name}=0) or name the arm's last link (--tip LINK)"
             )
     left = [name for name, joint in joints.items() if joint.get("type") in MOVING]
@@ -84,13 +89,11 @@ def _parsed(path: Path) -> Element:
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise ArmError(f"{path}: larger than {_MOST_BYTES // 10**6} MB, which no URDF is")
-        text = path.read_text(encoding="utf-8")
+        text = urdf_text(path)
     except OSError as error:
         raise ArmError(
             f"{path}: cannot be read ({error.strerror or error}); check the name and the permissions"
         ) from error
-    except UnicodeDecodeError as error:
-        raise ArmError(f"{path}: unreadable URDF: not a text in UTF-8") from error
     if "<!ENTITY" in text or "<!DOCTYPE" in text:
         raise ArmError(
             f"{path}: unreadable URDF: it declares a document type or entities, which are not expanded"
@@ -105,7 +108,28 @@ def _parsed(path: Path) -> Element:
         )
     if root.tag != "robot":
         raise ArmError(f"{path}: unreadable URDF: the root element is <{root.tag[:40]}>, it must be <robot>")
+    if not root.get("name"):
+        raise ArmError(f'{path}: <robot> has no name; give it one, such as <robot name="arm">')
     return root
+
+
+def urdf_text(path: Path) -> str:
+    """A URDF's text without what stands before its XML: in UTF-8, or in the encoding that it declares or begins with.
+
+    Raises `ArmError` where it is none of them.
+    """
+    raw = path.read_bytes()
+    declared = _ENCODING.match(raw)
+    marked = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    told = "utf-16" if marked else declared[1].decode() if declared else "utf-8"
+    for encoding in ("utf-8-sig", told):
+        try:
+            text = raw.decode(encoding).lstrip()
+        except (UnicodeDecodeError, LookupError):
+            continue
+        # the text is kept in UTF-8, whatever it came in
+        return text if encoding != told else _DECLARATION.sub('<?xml version="1.0"?>', text)
+    raise ArmError(f"{path}: unreadable URDF: not a text in UTF-8, nor in an encoding that it declares")
 
 
 def urdf_tree(text: str) -> Element:
@@ -184,6 +208,16 @@ def _check_tree(root: Element, path: Path) -> None:
                 f"{path}: link {child!r} is the child of two joints, {before[child]!r} and {name!r}; an arm has no loop"
             )
         before[child] = name
+    above = {child: parent for parent, child in map(_links, root.findall("joint"))}
+    for link in above:
+        way = [link]
+        while (upper := above.get(way[-1])) is not None:
+            if upper == link:
+                loop = ", ".join(repr(before[each]) for each in reversed(way))
+                raise ArmError(f"{path}: joints {loop} form a loop; an arm has none")
+            if upper in way:
+                break
+            way.append(upper)
 
 
 def _never_moved(root: Element) -> set[str]:

@@ -120,11 +120,15 @@ def check_joint(joint: Element, links: list[str], where: str) -> None:
     limit = joint.find("limit")
     if limit is None:
         return
+    values = {}
+    for key in _LIMITS:
+        if (text := limit.get(key, "").strip().lower()).lstrip("+-") in ("inf", "infinity"):
+            values[key] = float(text)
+            del limit.attrib[key]
     if all(key in limit.attrib and number(limit, key, f"{where}: <limit>") == 0 for key in _LIMITS):
         warn(f"{where}: <limit> is zero throughout, as where an export leaves it empty; it is taken for none")
         for key in _LIMITS:
             del limit.attrib[key]
-    values = {}
     for key in _LIMITS:
         if key in limit.attrib:
             values[key] = number(limit, key, f"{where}: <limit>")
@@ -142,7 +146,9 @@ def check_joint(joint: Element, links: list[str], where: str) -> None:
     if values.get("effort", 0.0) < 0:
         raise ArmError(f"{where}: <limit> effort={values['effort']:g} must not be negative")
     lower, upper = values.get("lower", -np.inf), values.get("upper", np.inf)
-    if kind != "continuous" and lower >= upper:
+    if kind != "continuous" and lower > upper:
+        raise ArmError(f"{where}: <limit> lower={lower:g} is above upper={upper:g}; exchange them")
+    if kind != "continuous" and lower == upper:
         raise ArmError(
             f"{where}: <limit> lower={lower:g} is not below upper={upper:g}; lock a joint that does not move "
             f"(--lock {joint.get('name')}={lower:g})"
