@@ -213,6 +213,12 @@ BYTES = {
     "blank": (b"\n\n\n", r"the header lacks time, q1, v1, tau1;"),
     "semicolons": (b"time;q1;v1;tau1\n0;0;0;0\n", r"the header is one column, 'time;q1;v1;tau1'; put commas"),
     "binary": (b"\x93NUMPY\x01\x00\xff\xfe\x80", r"not a text file in UTF-8"),
+    "gzip": (b"\x1f\x8b\x08\x00", r"is compressed by gzip, not a text; unpack it first"),
+    "Parquet": (b"PAR1\x15\x04", r"is a Parquet file, not a text; name it \.parquet"),
+    "a spreadsheet": (
+        b"PK\x03\x04",
+        r"is a zip archive or a spreadsheet, not a text; unpack it, or save the table as CSV",
+    ),
     "a binary cell": (b"time,q1,v1,tau1\n0,0,0,0\n1,0,\xff,0\n", r"not a text file in UTF-8|is not a number"),
 }
 
@@ -234,7 +240,10 @@ def test_a_missing_file_a_folder_and_an_unknown_suffix_are_named(tmp_path: Path)
         ("none.csv", "no such file"),
         ("none.parquet", "no such file"),
         ("folder.csv", "is a folder"),
-        ("run.xlsx", r"unknown suffix '.xlsx'; a motion log ends in .csv or .parquet"),
+        (
+            "run.xlsx",
+            r"unknown suffix '.xlsx'; a motion log ends in .csv or .parquet, and armloop convert makes",
+        ),
         ("run", r"unknown suffix ''"),
     ):
         with pytest.raises(LogError) as caught:

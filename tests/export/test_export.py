@@ -22,7 +22,7 @@ from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.robot.arm import load_arm
-from armloop.util.errors import ModelError
+from armloop.util.errors import InputError, ModelError
 
 PLAIN = (FrictionTerm("sign", 0.7), FrictionTerm("viscous", 2.0))
 RICH = (
@@ -111,6 +111,15 @@ def test_an_arm_that_leans_does_so_in_every_description(tmp_path, target, name, 
     assert any("the base leans" in note for note in found.notes)
     if target == "mjcf":
         assert found.unsaid is not None and (found.unsaid < 1e-6 * found.rms).all()
+
+
+@pytest.mark.parametrize(("target", "name", "other"), [("urdf", "arm.SDF", "sdf"), ("c", "arm.urdf", "urdf")])
+def test_a_name_by_which_readers_take_it_for_another_format_is_refused(tmp_path, target, name, other):
+    with pytest.raises(
+        InputError, match=f"by which readers take it for {other}; give another name, or --to {other}"
+    ):
+        export(model_of(load_arm("three_axis")), target, tmp_path / name)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("target", ["urdf", "sdf", "drake"])

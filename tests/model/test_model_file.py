@@ -157,6 +157,10 @@ TAMPERED: dict[str, tuple[Callable[[Data], None], str]] = {
         at("schema")("armloop/model/3"),
         r"schema is 'armloop/model/3', of a newer armloop; this one reads up to 'armloop/model/2'",
     ),
+    "a diagnosis": (
+        at("schema")("armloop/diagnosis/2"),
+        r"it must be 'armloop/model/2'; the model of a diagnosis lies beside it, in model\.json",
+    ),
     "no schema": (at("schema")(...), r"schema is None"),
     **{f"no {name}": (at(name)(...), f"field '{name}' is missing") for name in FIELDS},
     **{

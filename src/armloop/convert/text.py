@@ -14,7 +14,7 @@ import numpy as np
 from armloop.convert.clocks import clock_seconds
 from armloop.convert.recording import Array
 from armloop.convert.units import FACTORS, canonical
-from armloop.data.tables import is_number
+from armloop.data.tables import is_number, other_kind
 from armloop.util.errors import LogError
 
 _NUMBER = re.compile(
@@ -181,7 +181,8 @@ def _lines(path: Path) -> tuple[list[str], list[str]]:
             return text.splitlines(), [
                 "not UTF-8: read as Windows-1252, so that letters of names may be wrong"
             ]
-        raise LogError(f"{path}: not a text file in UTF-8; save the table as plain text") from error
+        what = other_kind(path) or "not a text file in UTF-8; save the table as plain text"
+        raise LogError(f"{path}: {what}") from error
 
 
 def _layout(lines: list[str]) -> tuple[str, int | None]:

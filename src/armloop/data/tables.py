@@ -25,6 +25,14 @@ if TYPE_CHECKING:
     from pyarrow.parquet import ParquetFile
 
 CSV, PARQUET = ".csv", ".parquet"
+#: What a file that is not empty has.
+_FIRST = {CSV: "the first line must name the columns", PARQUET: "a Parquet log has at least a footer"}
+#: First bytes of what is no text, and what to do about it.
+_NO_TEXT = {
+    b"\x1f\x8b": "compressed by gzip, not a text; unpack it first",
+    b"PAR1": f"a Parquet file, not a text; name it {PARQUET}",
+    b"PK\x03\x04": "a zip archive or a spreadsheet, not a text; unpack it, or save the table as CSV",
+}
 #: Rows that a Parquet file keeps together: a reader of some rows has to decode no more than these.
 ROW_GROUP = 1 << 16
 #: Bytes of each column that a reader of some rows takes from the disk at a time.
@@ -45,7 +53,9 @@ def read_header(path: Path) -> list[str]:
         raise LogError(f"{path}: not a file; give the path of a CSV or Parquet motion log")
     try:
         if path.stat().st_size == 0:
-            raise LogError(f"{path}: the file is empty; the first line must name the columns")
+            raise LogError(f"{path}: the file is empty; {_FIRST[kind_of(path)]}")
+        if kind_of(path) == CSV and (other := other_kind(path)):
+            raise LogError(f"{path}: {other}")
         line, names = (
             (1, _parquet_header(path)) if kind_of(path) == PARQUET else next(_csv_rows(path), (1, []))
         )
@@ -155,8 +165,18 @@ def _check_suffix(path: Path) -> None:
     if path.is_dir():
         raise LogError(f"{path}: is a folder; a motion log is a file that ends in {CSV} or {PARQUET}")
     if kind_of(path) not in (CSV, PARQUET):
-        raise LogError(f"{path}: unknown suffix {path.suffix!r}; a motion log ends in {CSV} or {PARQUET}")
+        raise LogError(
+            f"{path}: unknown suffix {path.suffix!r}; a motion log ends in {CSV} or {PARQUET}, "
+            "and armloop convert makes one of other recordings"
+        )
     check_name(path)
+
+
+def other_kind(path: Path) -> str:
+    """What a file is by its first bytes, and what to do about it, where these are those of no text; empty for others."""
+    with path.open("rb") as file:
+        first = file.read(max(map(len, _NO_TEXT)))
+    return next((f"is {what}" for mark, what in _NO_TEXT.items() if first.startswith(mark)), "")
 
 
 def check_name(path: Path) -> None:

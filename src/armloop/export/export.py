@@ -39,12 +39,18 @@ def export(
         motion: the states to compare at; random ones within the training range by default, none of them at rest.
 
     Raises:
-        InputError: the target is unknown, or the place cannot be written to.
+        InputError: the target is unknown, or the place cannot be written to or has another target's name.
         ModelError: the model cannot be said in this form at all.
     """
     path = path_of(path, "the path of an export")
     if not isinstance(target, str) or target not in TARGETS:
         raise InputError(f"--to {target}: unknown; it must be one of {', '.join(TARGETS)}")
+    others = [each for each, suffix in _SUFFIX.items() if suffix == path.suffix.lower() and each != target]
+    if others:
+        raise InputError(
+            f"{path}: ends in {path.suffix}, by which readers take it for {others[0]}; "
+            f"give another name, or --to {others[0]}"
+        )
     if model.in_amperes and target != "c":
         raise ModelError(
             f"the model predicts motor currents in A; {target} needs torques: reconstruct it with --drive-gains"

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from armloop.robot.urdf import as_of_a_body, base_links, read_urdf, rotation_about, serial_chain, urdf_text
+from armloop.robot.urdf import as_of_a_body, base_links, read_urdf, rotation_about, serial_chain, urdf_source
 from armloop.util.arrays import Array, Mask
 from armloop.util.errors import ArmError
 from armloop.util.given import path_of, require
@@ -234,7 +234,7 @@ def load_arm(spec: str | Path, lock: Mapping[str, float] | None = None, tip: str
     root = read_urdf(path)
     root = serial_chain(root, path, lock or {}, tip)
     changed = bool(lock) or tip is not None
-    urdf = ElementTree.tostring(root, encoding="unicode") if changed else urdf_text(path)
+    urdf = ElementTree.tostring(root, encoding="unicode") if changed else urdf_source(path)
     return _from_urdf(root, urdf, path)
 
 

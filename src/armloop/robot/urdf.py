@@ -89,7 +89,7 @@ def _parsed(path: Path) -> Element:
     try:
         if path.stat().st_size > _MOST_BYTES:
             raise ArmError(f"{path}: larger than {_MOST_BYTES // 10**6} MB, which no URDF is")
-        text = urdf_text(path)
+        text = urdf_source(path)
     except OSError as error:
         raise ArmError(
             f"{path}: cannot be read ({error.strerror or error}); check the name and the permissions"
@@ -113,7 +113,7 @@ def _parsed(path: Path) -> Element:
     return root
 
 
-def urdf_text(path: Path) -> str:
+def urdf_source(path: Path) -> str:
     """A URDF's text without what stands before its XML: in UTF-8, or in the encoding that it declares or begins with.
 
     Raises `ArmError` where it is none of them.

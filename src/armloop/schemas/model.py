@@ -270,6 +270,8 @@ def _other(schema: Any) -> str:
     """What is wrong with a schema that is not this one."""
     kind, _, number = schema.rpartition("/") if isinstance(schema, str) else ("", "", "")
     here, _, mine = SCHEMA.rpartition("/")
+    if kind == "armloop/diagnosis":
+        return f"it must be {SCHEMA!r}; the model of a diagnosis lies beside it, in model.json"
     if kind == here and number.isdecimal() and int(number) > int(mine):
         return f"of a newer armloop; this one reads up to {SCHEMA!r}"
     return f"it must be {SCHEMA!r}"

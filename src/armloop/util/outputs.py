@@ -106,7 +106,7 @@ def target(path: str | Path, option: str = "") -> Path:
     if _guard is not None and not _guard.force:
         if (found.st_dev, found.st_ino) in _guard.inputs:
             raise InputError(
-                f"{where}: is read by this command and would be replaced; choose another name, or add --force"
+                f"{where}: is read by this command and would be replaced; choose another name for {name}"
             )
         try:
             own = _own(real, _guard.command)
