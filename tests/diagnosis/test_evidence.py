@@ -15,9 +15,10 @@ from armloop.data.motion import Motion
 from armloop.data.signals import preprocess, smooth
 from armloop.diagnosis import evidence
 from armloop.diagnosis.evidence import Evidence
+from armloop.laws.effects import Estimate, effect
 from armloop.laws.effects.encoder_offset import EncoderOffset
 from armloop.laws.friction import FrictionLaw, FrictionTerm
-from armloop.model import ReconstructedModel
+from armloop.model import AddedEffect, ReconstructedModel
 from armloop.model.components import RigidBody
 from armloop.robot.kinematics import nominal_parameters
 
@@ -109,6 +110,26 @@ def test_columns_between_the_nodes_of_a_mesh_are_interpolated(monkeypatch: pytes
     off = [np.abs(given.smoothed(offset, x) - each).max() for x, each in zip(shapes, exact, strict=True)]
     assert asked == pytest.approx([0.02, 0.04, 0.06, 0.08])
     assert max(off) < 1e-6 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_mesh_is_as_fine_as_what_ripples(known: bool) -> None:
+    """Of a ripple of 90 in a turn nodes two hundredths of a radian apart say nothing, in the model or beside it."""
+    p = {
+        "amplitude": Estimate(5.0, 0.0, "N*m"),
+        "order": Estimate(90.0, 0.0, ""),
+        "phase": Estimate(0.3, 0.0, "rad"),
+    }
+    ripple = AddedEffect(effect("torque_ripple", 2), p)
+    model = model_with_baseline()
+    samples = preprocess(
+        [measured(motion_of(3, 5.0), torque(motion_of(3, 5.0)), 3, 0.01)], model.conditioning
+    )
+    bare = Evidence.of(model if known else model.with_effects([ripple]), samples, [])
+    given, offset = bare.knowing([ripple]) if known else bare, EncoderOffset(2)
+    for shape in (0.0137, -0.055):
+        exact = smooth(samples, offset.columns(given.context, shape))[given.independent]
+        np.testing.assert_allclose(given.smoothed(offset, shape), exact, atol=1e-3 * np.abs(exact).max())
 
 
 def test_what_is_tried_is_asked_once_of_a_model() -> None:

@@ -40,6 +40,8 @@ FEWEST_BLOCKS = 8
 #: Places of a joint (low, middle, high), and speeds (back, slow, forth), that make the cells of its motion.
 CELLS = 3
 
+#: A mesh serves as many harmonics of a joint's angle to a part in five thousand; beyond them it is finer.
+_HARMONICS = 15.0
 #: Columns of a run are kept up to so many bytes.
 _KEPT = 1 << 28
 
@@ -74,6 +76,7 @@ class Evidence:
         blocks: (N,) block of each sample.
         asked: effects that may be asked about.
         unknown: (N, n) samples of which a joint's torque says nothing, not even that friction may hold it.
+        known: effects that the columns of a model are those of, beside its own.
     """
 
     model: ReconstructedModel
@@ -85,6 +88,7 @@ class Evidence:
     context: Context
     asked: tuple[Effect, ...] = ()
     unknown: Mask | None = None
+    known: tuple[AddedEffect, ...] = ()
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
     _tried: dict[Place, tuple[float, ...]] = field(default_factory=dict, repr=False)
@@ -116,7 +120,7 @@ class Evidence:
         every = [*(added.effect for added in known), *self.asked]
         context = model.context(self.samples.motion, every)
         context = replace(context, period=self.context.period)
-        return replace(self, context=context, _of_model=_Columns(), _tried={})
+        return replace(self, context=context, known=tuple(known), _of_model=_Columns(), _tried={})
 
     def tried(self, effect: Effect) -> tuple[float, ...]:
         """Values of an effect's nonlinear parameter to try."""
@@ -201,7 +205,9 @@ class Evidence:
         """
         if effect.mesh is None:
             return self._smoothed_at(effect, shape)
-        nodes = cubic_nodes(shape, effect.mesh)
+        every = (*self.model.effects, *self.known)
+        orders = [added.effect.order(added.values) for added in every if added.effect.joint == effect.joint]
+        nodes = cubic_nodes(shape, effect.mesh * _HARMONICS / max([_HARMONICS, *orders]))
         return np.asarray(sum(weight * self._smoothed_at(effect, node) for node, weight in nodes))
 
     def _smoothed_at(self, effect: Effect, shape: float) -> Array:

@@ -18,12 +18,12 @@ def context() -> Context:
 
 def test_its_columns_are_the_change_of_torque_per_radian(context: Context) -> None:
     offset, q = effect("encoder_offset", 2), context.motion.q[:, 1]
-    for shift in (0.3, -0.3, 0.011):
+    for shift in (0.3, -0.3, 0.0011):
         made = offset.columns(context, shift)
         assert made.shape == (9, 3, 1) and not made[:, [0, 2]].any()
         assert_allclose(made[:, 1, 0], 10 * (np.sin(q - shift) - np.sin(q)) / shift, atol=1e-9)
-    for small in (0.0, 0.01, -0.009):
-        slope = 10 * (np.sin(q - 0.01) - np.sin(q + 0.01)) / 0.02
+    for small in (0.0, 0.001, -0.0009):
+        slope = 10 * (np.sin(q - 0.001) - np.sin(q + 0.001)) / 0.002
         assert_allclose(offset.columns(context, small)[:, 1, 0], slope, atol=1e-9)
     change = offset.torque(context, {"offset": 0.2})
     assert_allclose(change[:, 1], 10 * (np.sin(q - 0.2) - np.sin(q)), atol=1e-9)

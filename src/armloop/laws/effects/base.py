@@ -298,6 +298,10 @@ class Effect(ABC):
         """The torque as a function of q and v alone, written for every kind of number; None where it is none."""
         return None
 
+    def order(self, parameters: Mapping[str, Value]) -> float:
+        """The highest harmonic of its joint's angle in the torque, where that is higher than a rigid body's; else zero."""
+        return 0.0
+
     def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body | None:
         """The bodies whose torque it is, where it is one of rigid bodies; ``inertial`` (10 n,) are the model's."""
         return None

@@ -29,10 +29,9 @@ class EncoderOffset(Effect):
         ),
     }
 
-    # a torque of as much as the fifteenth harmonic of q is interpolated within a part in five thousand
     mesh: ClassVar = 0.02
     #: Half the step of the derivative, rad (m).
-    step = 0.01
+    step = 0.001
     #: A larger shift is no small fault, rad (m).
     farthest = 0.6
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Context, Estimate, Parameter, number
+from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Value, number
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
 from armloop.robot.arm import Arm
@@ -86,6 +86,9 @@ class TorqueRipple(Law):
         step = self.part * 2 * np.pi / max(float(np.ptp(context.motion.q[:, self.index])), TINY)
         beside = np.arange(step, 1.0, max(step, self.part))
         return [float(order) for order in np.concatenate([shape - beside[::-1], shape + beside])]
+
+    def order(self, parameters: Mapping[str, Value]) -> float:
+        return number(parameters["order"])
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         a, order, phase = (parameters[key] for key in ("amplitude", "order", "phase"))
