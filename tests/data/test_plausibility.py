@@ -379,3 +379,15 @@ def test_no_measured_log_is_accused(measured: Path) -> None:
         # the README of the Panda states 5 ms; the controller PILCO logs at 33 Hz with backward differences
         assert bool(lags) == (path.parent.name == "panda" or "pilco" in path.name), path
         assert bool(slow) == ("pilco" in path.name), path
+
+
+@pytest.mark.parametrize("rows", [slice(0, 1), slice(-2, None)])
+def test_a_step_whose_other_side_is_missing_is_no_spike(rows: slice) -> None:
+    """A joint turns round in a log's last row, and its dry friction with it; what is far larger than all else is one."""
+    log = good()
+    tau = np.full_like(log.tau, -1.2) + 0.01 * log.v
+    tau[rows, 1] = 1.2
+    MotionLog(log.time, log.q, log.v, tau)
+    tau[rows, 1] = 40.0
+    with pytest.raises(LogError, match="column tau2, row .* has a spike of 40, while all else lies within"):
+        MotionLog(log.time, log.q, log.v, tau)

@@ -146,11 +146,15 @@ def _spikes(log: Recorded) -> Iterator[Finding]:
         if len(ends) > 5 or np.diff(ends, prepend=-1).max() > _SPIKE_SAMPLES:
             continue
         rest = np.delete(away, high)
+        if high[0] == 0 or high[-1] == len(x) - 1:
+            # what begins or ends a log may be a step of which the other side is missing: friction that turns
+            peak, rest = float(np.abs(x[high]).max()), np.delete(np.abs(x), high)
         if len(rest) and peak > _SPIKE_RATIO * max(float(rest.max()), _SPIKE_LEAST[kind] / _SPIKE_RATIO):
             row = int(np.argmax(away))
             yield Finding(
                 f"column {kind}{j + 1}",
-                f"has a spike of {x[row]:.6g}, while all else lies within {rest.max():.3g} of the median; "
+                f"has a spike of {x[row]:.6g}, while all else lies within {np.delete(away, high).max():.3g} of the "
+                "median; "
                 "correct it or drop the row",
                 row,
             )
