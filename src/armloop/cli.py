@@ -22,6 +22,7 @@ from armloop.commands.options import Options
 from armloop.util.doubts import listening
 from armloop.util.errors import InputError, one_line
 from armloop.util.outputs import guarding
+from armloop.util.quiet import quiet
 
 #: In the order of the help. A command `name` is the module armloop.commands.name, its options the class Name in it.
 COMMANDS = (
@@ -119,7 +120,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             codecs.register_error("spelt_out", _spelt_out)
             stream.reconfigure(errors="spelt_out")
     try:
-        with listening() as doubts, _ending_on_request():
+        # whose cache of fonts has no place to be kept, as where a container has no home, plots as well without
+        with listening() as doubts, _ending_on_request(), quiet("matplotlib"):
             given = build_parser().parse_args(arguments)
             options = given.kind(vars(given))
             with guarding(options.command, _named_files(options), options.force):

@@ -1,6 +1,7 @@
 """What commands answer with --json, and what they write, is what the published schemas describe."""
 
 import json
+import logging
 from pathlib import Path
 
 import pytest
@@ -59,3 +60,16 @@ def test_an_answer_that_is_not_is_noticed() -> None:
     for wrong in ({"samples": -1}, {"rmse": [-0.1]}, {"moving": {"rmse": [0.1]}}, {"nrmse": "small"}):
         with pytest.raises(ValueError):
             checked({**answer, **wrong}, FILES["evaluation"])
+
+
+def test_a_home_that_cannot_be_written_to_is_nobodys_trouble(
+    inputs: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """As in a container: where no cache of fonts can be kept, matplotlib makes one anew, and would say so at length."""
+    monkeypatch.chdir(inputs)
+    monkeypatch.setattr(
+        "armloop.cli._named_files", lambda options: [logging.getLogger("matplotlib").warning("no place")] * 0
+    )
+    assert main(["cluster", "good.csv", "--json"]) == 0
+    assert not caplog.records
+    assert logging.getLogger("matplotlib").isEnabledFor(logging.WARNING)

@@ -389,5 +389,5 @@ def test_a_step_whose_other_side_is_missing_is_no_spike(rows: slice) -> None:
     tau[rows, 1] = 1.2
     MotionLog(log.time, log.q, log.v, tau)
     tau[rows, 1] = 40.0
-    with pytest.raises(LogError, match="column tau2, row .* has a spike of 40, while all else lies within"):
+    with pytest.raises(LogError, match=r"column tau2, row .* has a spike of 40, while all else lies within"):
         MotionLog(log.time, log.q, log.v, tau)
