@@ -30,3 +30,16 @@ def test_the_same_measurement_given_twice_is_refused() -> None:
         assert same_measurement(one, twice)
         with pytest.raises(LogError, match=rf"{twice.name}: holds the measurement of run once more"):
             require_different([one, other, twice])
+
+
+def test_of_a_log_that_overlaps_another_it_is_said_how_far() -> None:
+    """Two pieces that were cut out of one recording."""
+    whole = measured(1, "run")
+    first, second = (
+        replace(whole.select(slice(0, 500)), name="first"),
+        replace(whole.select(slice(200, 800)), name="second"),
+    )
+    with pytest.raises(
+        LogError, match="second: holds the measurement of first once more, in 300 of its 600 different rows"
+    ):
+        require_different([first, second])

@@ -22,7 +22,8 @@ def require_different(logs: Sequence[MotionLog]) -> None:
         for j, other in enumerate(logs[:k]):
             if _mostly_shared(digests[j], digests[k]):
                 raise LogError(
-                    f"{log.name}: holds the measurement of {other.name} once more; give each measurement once"
+                    f"{log.name}: holds the measurement of {other.name} once more"
+                    f"{_part(digests[k], digests[j])}; give each measurement once"
                 )
 
 
@@ -48,5 +49,14 @@ def same_measurement(one: MotionLog, other: MotionLog) -> bool:
 
 
 def _mostly_shared(first: NDArray[np.uint64], second: NDArray[np.uint64]) -> bool:
-    shared = len(np.intersect1d(first, second, assume_unique=True))
-    return shared > _SHARED_ROWS * min(len(first), len(second))
+    return _shared(first, second) > _SHARED_ROWS * min(len(first), len(second))
+
+
+def _shared(first: NDArray[np.uint64], second: NDArray[np.uint64]) -> int:
+    return len(np.intersect1d(first, second, assume_unique=True))
+
+
+def _part(mine: NDArray[np.uint64], others: NDArray[np.uint64]) -> str:
+    """How many of a log's rows are another's, where that is not all of them."""
+    shared = _shared(mine, others)
+    return "" if shared == len(mine) else f", in {shared} of its {len(mine)} different rows"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -141,8 +142,9 @@ class TestLibraries:
         assert self.taken(made(0.2, 5), made(0.1, 9, passed=False)) == [0]
         assert self.taken(made(0.2, 5, passed=False), made(0.1, 9, passed=False)) == [1]
         assert self.taken(made(0.1, 5, tried=False), made(0.2, 9)) == [1]
-        with pytest.raises(InputError, match=r"0\.1 5: too short; 0\.2 9: too short"):
-            choose([made(0.1, 5, tried=False), made(0.2, 9, tried=False)])
+        with pytest.raises(InputError, match=r"^0\.1 5, 0\.2 9: too short; 0\.3 1: still$"):
+            still = replace(made(0.3, 1, tried=False), refused="still")
+            choose([made(0.1, 5, tried=False), still, made(0.2, 9, tried=False)])
         nothing: Any = None
         assert Contender(nothing, nrmse=(None,)).error == np.inf and self.contender(0.2, 1).error == 0.2
 

@@ -225,7 +225,9 @@ def choose(tried: Sequence[Contender]) -> list[Contender]:
     """
     made = [one for one in tried if one.attempt is not None]
     if not made:
-        raise InputError("; ".join(f"{one.name}: {one.refused}" for one in tried))
+        reasons = dict.fromkeys(one.refused for one in tried)
+        each = (f"{', '.join(o.name for o in tried if o.refused == why)}: {why}" for why in reasons)
+        raise InputError("; ".join(each))
     eligible = [one for one in made if one.passed] or made
     best = min(eligible, key=lambda one: one.error)
     simpler = [one for one in eligible if one.complexity < best.complexity and _no_worse(one, best)]
