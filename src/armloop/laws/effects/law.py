@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -142,6 +143,13 @@ class Law(Effect):
             return shape
         size = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
         return shape * float(np.exp(np.clip(x[1] / size, -self._FARTHEST, self._FARTHEST)))
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        found, own = super().estimates(arm, x, covariance, shape), self._shape()
+        if own is not None and self._profiled() and abs(x[1]) >= self._FARTHEST * abs(x[0]):
+            # held where the first order ends: by how much it is off nobody knows
+            found[own.name] = replace(found[own.name], std_error=np.nan)
+        return found
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         coefficients, shape = self._numbers(parameters)
