@@ -91,6 +91,24 @@ def test_squares_where_a_joint_turns_round_and_where_it_creeps(monkeypatch: pyte
     assert asked == [[2.0, 3.0], [0.0, 0.0]]
 
 
+def test_a_baseline_is_of_motion_as_fast_as_the_model_knows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The printed errors are of all motion; blocks and baseline without what is slower than was fitted, sums per joint."""
+    monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
+    speed = np.random.default_rng(5).uniform(0.0, 1.0, (N, 2))
+    monkeypatch.setattr(tally, "held_speed", lambda samples: speed)
+    model: Any = SimpleNamespace(history={"slowest": [0.5, 0.0]})
+    found, whole = Tally.of(chunk(1.0), model, None), Tally.of(chunk(1.0), NOBODY, None)
+    held = (BLOCKS % 5 == 0)[:, None]
+    slid = MOVING & held & (speed >= [0.5, 0.0])
+    assert 2 <= slid[:, 0].sum() < (MOVING & held)[:, 0].sum()
+    np.testing.assert_array_equal(found.sums[0], whole.sums[0])
+    np.testing.assert_allclose(found.sliding[0][[0, 2]], [(LEFT**2 * slid).sum(axis=0), slid.sum(axis=0)])
+    np.testing.assert_allclose(found.blocks.sum(axis=0), found.sliding[0][[0, 2]])
+    rmse = np.sqrt(found.sliding[0][0] / found.sliding[0][2])
+    np.testing.assert_allclose(found.baseline()["rmse"], rmse)
+    np.testing.assert_allclose(whole.sliding[0], whole.sums[0][1])
+
+
 def test_blocks_told_apart_in_pieces_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
     model = NOBODY
@@ -118,6 +136,6 @@ def test_relative_to_the_torque_where_a_joint_has_any() -> None:
     sums = np.zeros((2, 3, 2))
     sums[1] = [[40.0, 60.0], [180.0, 0.0], [20.0, 20.0]]
     # a joint without torque has no relative error: the other one's alone
-    found = Tally({0: sums}, blocks, 20, {})
+    found = Tally({0: sums}, blocks, 20, {}, {0: sums[1]})
     np.testing.assert_allclose(found.relative_blocks(), [2.0 / 9.0])
     assert found.baseline()["nrmse"] == [pytest.approx(np.sqrt(2.0) / 3.0), None]

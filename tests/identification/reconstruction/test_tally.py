@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,7 @@ def tally(counts: list[list[int]], errors: list[list[float]]) -> Tally:
         "reversals": np.array([25.0 * c.sum(axis=0), c.sum(axis=0)]),
         "creeping": np.array([9.0 * c[0], c[0]]),
     }
-    return Tally({0: np.array([rest, moving])}, blocks, int(c.sum()) + 1, places)
+    return Tally({0: np.array([rest, moving])}, blocks, int(c.sum()) + 1, places, {0: moving})
 
 
 def test_rest_and_motion_are_scored_apart_and_together() -> None:
@@ -32,9 +34,12 @@ def test_rest_and_motion_are_scored_apart_and_together() -> None:
 
 def test_tallies_add_over_chunks_and_conditions() -> None:
     one, two = tally([[30]], [[1.0]]), tally([[10]], [[5.0]])
-    both = one + Tally({0: two.sums[0], 3: 2 * two.sums[0]}, two.blocks, two.samples, two.places)
+    sums, sliding = ({0: each[0], 3: 2 * each[0]} for each in (two.sums, two.sliding))
+    both = one + Tally(sums, two.blocks, two.samples, two.places, sliding)
     np.testing.assert_array_equal(both.sums[0], one.sums[0] + two.sums[0])
     np.testing.assert_array_equal(both.sums[3], 2 * two.sums[0])
+    np.testing.assert_array_equal(both.sliding[0], one.sliding[0] + two.sliding[0])
+    np.testing.assert_array_equal(both.sliding[3], 2 * two.sliding[0])
     assert both.samples == 31 + 11 and both.blocks.shape == (2, 2, 1)
     assert both.places["reversals"].tolist() == [[1000.0], [40.0]]
     assert both.yardsticks() == {"worst": [None], "reversals": [5.0], "creeping": [3.0]}
@@ -44,7 +49,8 @@ def test_tallies_add_over_chunks_and_conditions() -> None:
 
 def test_the_baseline_is_that_of_the_worst_condition() -> None:
     one, two = tally([[30, 0]], [[1.0, 0.0]]), tally([[10, 0]], [[5.0, 0.0]])
-    found = (one + Tally({1: two.sums[0]}, two.blocks, two.samples, two.places)).baseline()
+    other = Tally({1: 9.0 * two.sums[0]}, two.blocks, two.samples, two.places, {1: two.sliding[0]})
+    found = replace(one + other, sums={0: one.sums[0] + two.sums[0]}).baseline()
     assert found["rmse"] == [pytest.approx(np.sqrt(5.0)), None]
     assert found["rms"] == [pytest.approx(2.0), None]
     assert found["nrmse"] == [pytest.approx(np.sqrt(5.0) / 2), None]
@@ -92,5 +98,5 @@ def test_a_baseline_is_no_better_than_what_is_left_of_all_data() -> None:
 
 
 def test_of_no_sample_nothing_is_scored() -> None:
-    score = Tally({}, np.zeros((0, 2, 2)), 0, {}).score()
+    score = Tally({}, np.zeros((0, 2, 2)), 0, {}, {}).score()
     assert (score.samples, score.overall["rmse"], score.moving["nrmse"]) == (0, [None, None], [None, None])

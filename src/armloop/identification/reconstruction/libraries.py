@@ -27,7 +27,7 @@ from armloop.identification.reconstruction.library import Library
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.rigid_body import RigidBodyLibrary
-from armloop.identification.reconstruction.shared import motion_range
+from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
 from armloop.identification.reconstruction.stepwise import DoubleFeatureSetLibrary
 from armloop.identification.reconstruction.tally import SELECTION, Part, Tally
 from armloop.model import ReconstructedModel
@@ -108,7 +108,8 @@ class Attempt:
 
     def model(self) -> ReconstructedModel:
         """What was fitted without the held-out blocks: a model that has seen those that judge must choose nothing."""
-        history = {"range": motion_range(self.data.reference.samples.motion)}
+        reference = self.data.reference.samples
+        history = {"range": motion_range(reference.motion), "slowest": slowest_sliding(reference)}
         return self.found.model(conditioning=self.conditioning, history=history)
 
     def coefficients(self) -> int:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from armloop.data.blocks import block_numbers
-from armloop.data.creep import creeping
+from armloop.data.creep import creeping, held_speed
 from armloop.data.motion import Samples
 from armloop.data.reversals import at_reversals, passing
 from armloop.identification.reconstruction.data import Chunk
@@ -43,9 +43,11 @@ class Tally:
     Attributes:
         sums: per working condition (0 where samples are not sorted), (2, 3, n): of samples at rest and of
             moving ones, the squared errors, the squared torques and the number.
-        blocks: (B, 2, n) of every block: the squared errors of moving samples, and their number; empty where
+        blocks: (B, 2, n) of every block: the squared errors of samples that slide, and their number; empty where
             samples are no time series.
         samples: number of held-out samples.
+        sliding: per working condition, (3, n): the same as ``sums`` of moving samples in which a joint is not slower than
+            it slid where the model was fitted. What friction is there the model cannot know, nor is a run judged by it.
         places: (2, n) of samples where a joint turns round (``reversals``, :mod:`armloop.data.reversals`), and where it
             creeps (``creeping``, :mod:`armloop.data.creep`): the squared errors, and their number; zeros where samples are
             no time series.
@@ -55,10 +57,12 @@ class Tally:
     blocks: Array
     samples: int
     places: dict[str, Array]
+    sliding: dict[int, Array]
 
     def __add__(self, other: Tally) -> Tally:
         blocks, samples = np.concatenate([self.blocks, other.blocks]), self.samples + other.samples
-        return Tally(added(self.sums, other.sums), blocks, samples, added(self.places, other.places))
+        places, sliding = added(self.places, other.places), added(self.sliding, other.sliding)
+        return Tally(added(self.sums, other.sums), blocks, samples, places, sliding)
 
     @staticmethod
     def of(
@@ -79,11 +83,14 @@ class Tally:
         samples, held = chunk.samples, chunk.judging(part, margin)
         every = residual(model, samples) ** 2
         squares, moving = every[held], samples.moving[held]
+        slid = _as_fast_as_known(samples, model)[held]
         labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples)
-        sums = {}
+        sums, sliding = {}, {}
         for label in np.unique(labels[held]):
             rows = labels[held] == label
-            sums[int(label)] = error_sums(squares[rows], samples.tau[held][rows], moving[rows])
+            given = squares[rows], samples.tau[held][rows]
+            sums[int(label)] = error_sums(*given, moving[rows])
+            sliding[int(label)] = error_sums(*given, slid[rows])[1]
         n = squares.shape[1]
         blocks, places = np.zeros((0, 2, n)), dict.fromkeys(PLACES, np.zeros((2, n)))
         if samples.cutoff_hz > 0 and held.any():
@@ -93,11 +100,11 @@ class Tally:
             keys = np.column_stack([chunk.blocks[held], pieces[held]])
             index = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
             blocks = np.zeros((int(index.max()) + 1, 2, n))
-            np.add.at(blocks, index, np.stack([squares * moving, moving.astype(float)], axis=1))
+            np.add.at(blocks, index, np.stack([squares * slid, slid.astype(float)], axis=1))
             for key, there in _places(samples, model).items():
                 counted = there & held[:, None]
                 places[key] = np.array([(every * counted).sum(axis=0), counted.sum(axis=0)])
-        return Tally(sums, blocks, int(held.sum()), places)
+        return Tally(sums, blocks, int(held.sum()), places, sliding)
 
     @staticmethod
     def fitted(chunk: Chunk, model: ReconstructedModel, sorter: Sorter | None, seconds: float) -> Tally:
@@ -116,7 +123,7 @@ class Tally:
         A later run is one of motion; easy data (creeping, steady) must not make the model look better than
         it is on those.
         """
-        per_condition = [errors_of(moving)["rmse"] for _, moving in self.sums.values()]
+        per_condition = [errors_of(sums)["rmse"] for sums in self.sliding.values()]
         rmse = [
             max((x for x in joint if x is not None), default=None)
             for joint in zip(*per_condition, strict=True)
@@ -159,6 +166,12 @@ class Tally:
             mean = errors[enough] / counts[enough]
             found.append(float(np.sqrt(np.quantile(mean, 0.9))) if many else None)
         return found
+
+
+def _as_fast_as_known(samples: Samples, model: ReconstructedModel) -> Mask:
+    """(N, n) moving samples around which a joint is no slower than it slid where the model was fitted."""
+    slowest = model.history.get("slowest")
+    return samples.moving & (held_speed(samples) >= np.asarray(slowest)) if slowest else samples.moving
 
 
 def _places(samples: Samples, model: ReconstructedModel) -> dict[str, Mask]:
