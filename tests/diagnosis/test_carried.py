@@ -306,6 +306,17 @@ def test_what_is_left_of_samples_that_a_load_leaves_out_speaks_for_none(
     assert account_with_load(whole, account, silent, 1) is None and len(searched) == 1
 
 
+@pytest.mark.parametrize(
+    ("before", "left", "most"), [(10.0, 5.0, True), (10.0, 5.1, False), (-10.0, -6.0, False)]
+)
+def test_of_what_is_no_more_than_the_baseline_a_load_explains_nothing(
+    before: float, left: float, most: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(carrying, "_excess", lambda account, rows: before)
+    nothing: Any = None
+    assert carrying._explains_most(left, nothing, nothing) is most
+
+
 def test_the_account_with_a_load_is_one_of_the_model_as_it_is(
     model: ReconstructedModel, accounts: tuple[Evidence, Account, Account | None]
 ) -> None:

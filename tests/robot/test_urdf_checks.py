@@ -100,6 +100,11 @@ WRONG: dict[str, tuple[str, str]] = {
     "a mimic": ("".join(PARTS), r"joint 'finger_b' mimics 'finger_a'.*--lock finger_b=0"),
     "a loop": (GOOD + joint("back", "l2", "base", "fixed"), r"joints 'j2', 'back', 'j1' form a loop"),
     "a loop beside the base": (GOOD.replace('parent link="base"', 'parent link="l2"'), r"joints 'j2', 'j1' form a loop"),
+    "what hangs on a loop": (
+        GOOD.replace('parent link="base"', 'parent link="l2"').replace("<joint", joint("first", "l1", "tool") + "<joint", 1)
+        + link("tool"),
+        r"joints 'j2', 'j1' form a loop",
+    ),
     "a mimic of none": ("".join(PARTS).replace('joint="finger_a"', 'joint="x"'), r"mimics 'x', which no joint is called"),
 }  # fmt: skip
 
@@ -135,6 +140,7 @@ def test_a_urdf_may_be_in_an_encoding_that_it_declares(tmp_path: Path, encoding:
     path.write_bytes(f'{mark}\n<?xml version="1.0" encoding="{declared}"?>\n{body}'.encode(encoding))
     arm = load_arm(path)
     assert arm.joints[0].name == "gelänk"
+    ElementTree.fromstring(arm.urdf.encode("utf-8"))  # what it declares now is true
     path.write_text(arm.urdf, encoding="utf-8")
     assert load_arm(path).joints == arm.joints
 
