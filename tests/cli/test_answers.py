@@ -3,6 +3,7 @@
 import json
 import logging
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -67,9 +68,12 @@ def test_a_home_that_cannot_be_written_to_is_nobodys_trouble(
 ) -> None:
     """As in a container: where no cache of fonts can be kept, matplotlib makes one anew, and would say so at length."""
     monkeypatch.chdir(inputs)
-    monkeypatch.setattr(
-        "armloop.cli._named_files", lambda options: [logging.getLogger("matplotlib").warning("no place")] * 0
-    )
+
+    def complaining(options: Any) -> list[str]:
+        logging.getLogger("matplotlib").warning("no place")
+        return []
+
+    monkeypatch.setattr("armloop.cli._named_files", complaining)
     assert main(["cluster", "good.csv", "--json"]) == 0
     assert not caplog.records
     assert logging.getLogger("matplotlib").isEnabledFor(logging.WARNING)

@@ -16,9 +16,9 @@ from armloop.data.signals import preprocess
 from armloop.diagnosis import account as accounts
 from armloop.diagnosis import diagnose, unlisted
 from armloop.diagnosis.account import Account
-from armloop.diagnosis.evidence import FOLDS, Evidence, too_slow
+from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.score import Score
-from armloop.identification.scoring import score
+from armloop.identification.scoring import score, too_slow
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody

@@ -161,6 +161,12 @@ def test_entities_are_not_expanded_and_bytes_are_checked(tmp_path: Path) -> None
     path.write_bytes(b"<robot name='\xff\xfe'/>")
     with pytest.raises(ArmError, match="not a text in UTF-8"):
         load_arm(path)
+    for encoding in ("klingon", "undefined", "hex"):
+        path.write_bytes(
+            f"<?xml version='1.0' encoding='{encoding}'?>".encode() + b"<robot name='\xff\xfe'/>"
+        )
+        with pytest.raises(ArmError, match="nor in an encoding that it declares"):
+            load_arm(path)
     with pytest.raises(ArmError, match="cannot be read"):
         load_arm("a" * 300 + ".urdf")
     with pytest.raises(ArmError, match=r"cannot be read|no such file"):

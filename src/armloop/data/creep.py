@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from armloop.data.motion import Samples
 from armloop.util.arrays import Array, Mask
@@ -30,6 +29,9 @@ def held_speed(samples: Samples) -> Array:
     What the filter mixes with faster motion tells of that: a joint that only passes through a slow speed, as it starts,
     stops or turns round, shows next to nothing of its friction there.
     """
+    # what refuses a command for want of a file comes by here, and has no need of it
+    from scipy.ndimage import maximum_filter1d
+
     speed = np.abs(samples.motion.v)
     width = 2 * round(samples.reach / samples.period) + 1
     for run in samples.motion.runs() if width > 1 else ():

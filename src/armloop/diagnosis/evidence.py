@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves, widened
-from armloop.data.creep import held_speed, may_stick
+from armloop.data.creep import may_stick
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
-from armloop.identification.scoring import filtered_context, residual
+from armloop.identification.scoring import filtered_context, residual, too_slow
 from armloop.identification.uncertainty import friction_spread, torque_errors
 from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.base import Place
@@ -275,14 +275,6 @@ def far_outside(motion: Motion, ranges: Any) -> Mask:
     half, v, vdot, centre = np.asarray(ranges, dtype=float)
     parts = [(motion.q - centre, half), (motion.v, v), (motion.vdot, vdot)]
     return np.asarray(np.any([np.abs(x) > FAR * np.maximum(size, 1e-9) for x, size in parts], axis=0))
-
-
-def too_slow(model: ReconstructedModel, samples: Samples) -> Mask:
-    """(N, n) samples around which a joint is slower than it slid in training: what friction is there, the model cannot know.
-
-    Where it only passes through such a speed, it did so in training, too.
-    """
-    return np.asarray(held_speed(samples) < np.asarray(model.history.get("slowest") or 0.0))
 
 
 def near_standstill(samples: Samples) -> Mask:

@@ -17,9 +17,10 @@ from armloop.data.blocks import widened
 from armloop.data.creep import CREEPING, STICKING
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
-from armloop.diagnosis.evidence import Evidence, fastest, sticking, too_slow
+from armloop.diagnosis.evidence import Evidence, fastest, sticking
 from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
 from armloop.dynamics import Dynamics, ModelEquations
+from armloop.identification.scoring import too_slow
 from armloop.laws.friction import Direction
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import PER_MEDIAN, Array, Mask

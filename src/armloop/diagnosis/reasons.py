@@ -16,7 +16,6 @@ from armloop.diagnosis.evidence import (
     far_outside,
     shortest_block,
     sliding,
-    too_slow,
 )
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE
 from armloop.identification.goodness import (
@@ -27,6 +26,7 @@ from armloop.identification.goodness import (
     parts_of,
     witness,
 )
+from armloop.identification.scoring import too_slow
 from armloop.laws.effects.events import ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Mask

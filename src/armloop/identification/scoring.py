@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from armloop.data.creep import held_speed
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
@@ -44,6 +45,14 @@ class Score:
 def residual(model: ReconstructedModel, samples: Samples) -> Array:
     """(N, n) measured minus predicted torque, both through the same filter."""
     return samples.tau - smooth(samples, model.predict(samples.motion))
+
+
+def too_slow(model: ReconstructedModel, samples: Samples) -> Mask:
+    """(N, n) samples around which a joint is slower than it slid in training: what friction is there, the model cannot know.
+
+    Where it only passes through such a speed, it did so in training, too. Neither a baseline nor a run is judged by them.
+    """
+    return np.asarray(held_speed(samples) < np.asarray(model.history.get("slowest") or 0.0))
 
 
 def filtered_context(model: ReconstructedModel, samples: Samples, effects: Sequence[Effect]) -> Context:

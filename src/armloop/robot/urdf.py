@@ -125,7 +125,7 @@ def urdf_source(path: Path) -> str:
     for encoding in ("utf-8-sig", told):
         try:
             text = raw.decode(encoding).lstrip()
-        except (UnicodeDecodeError, LookupError):
+        except (UnicodeError, LookupError):
             continue
         # the text is kept in UTF-8, whatever it came in
         return text if encoding != told else _DECLARATION.sub('<?xml version="1.0"?>', text)

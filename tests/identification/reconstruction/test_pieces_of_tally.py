@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from armloop.data.motion import Motion, Samples
+from armloop.identification import scoring
 from armloop.identification.reconstruction import tally
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.tally import Tally
@@ -95,7 +96,7 @@ def test_a_baseline_is_of_motion_as_fast_as_the_model_knows(monkeypatch: pytest.
     """The printed errors are of all motion; blocks and baseline without what is slower than was fitted, sums per joint."""
     monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
     speed = np.random.default_rng(5).uniform(0.0, 1.0, (N, 2))
-    monkeypatch.setattr(tally, "held_speed", lambda samples: speed)
+    monkeypatch.setattr(scoring, "held_speed", lambda samples: speed)
     model: Any = SimpleNamespace(history={"slowest": [0.5, 0.0]})
     found, whole = Tally.of(chunk(1.0), model, None), Tally.of(chunk(1.0), NOBODY, None)
     held = (BLOCKS % 5 == 0)[:, None]

@@ -169,3 +169,20 @@ def test_a_diagnosis_refuses_and_an_evaluation_warns(
     said = capsys.readouterr().err
     assert said.endswith("zero: every tau is zero throughout; give a log that holds the joints' torques\n")
     assert model.arm.n == three_axis().n
+
+
+def test_what_is_usual_of_a_log_is_so_for_samples_that_creep_too(model: ReconstructedModel) -> None:
+    """The baseline's worst tenth is of joints that slide; of a log that creeps for a part, what was left of such counts."""
+    samples = preprocess([run(1, 15.0)], model.conditioning)
+    fastest = np.quantile(np.abs(samples.motion.v), 0.99, axis=0)
+    baseline = {**model.baseline, "worst": [0.3, 0.3, 0.3], "creeping": [0.0, 20.0, None]}
+    ranges = [[1.0] * 3, fastest.tolist(), [1.0] * 3, [0.0] * 3]
+    told = replace(model, baseline=baseline, history={**model.history, "range": ranges})
+    creeps = (samples.moving & (np.abs(samples.motion.v) < 0.05 * fastest)).sum(axis=0)
+    part = creeps / samples.moving.sum(axis=0)
+    assert part[1] > 0.002
+    tau = np.sqrt(np.mean(samples.tau**2, axis=0, where=samples.moving))
+    left = [0.3, np.sqrt(0.09 + 400.0 * part[1]), 0.3]
+    np.testing.assert_allclose(misrecorded_module._usual(told, samples), left / tau)
+    nobody = replace(told, history={})
+    np.testing.assert_allclose(misrecorded_module._usual(nobody, samples), 0.3 / tau)

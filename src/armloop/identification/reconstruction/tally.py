@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from armloop.data.blocks import block_numbers
-from armloop.data.creep import creeping, held_speed
+from armloop.data.creep import creeping
 from armloop.data.motion import Samples
 from armloop.data.reversals import at_reversals, passing
 from armloop.identification.reconstruction.data import Chunk
@@ -21,6 +21,7 @@ from armloop.identification.scoring import (
     residual,
     root_mean,
     score_of_sums,
+    too_slow,
 )
 from armloop.model import ReconstructedModel
 from armloop.regression.moments import added
@@ -83,7 +84,7 @@ class Tally:
         samples, held = chunk.samples, chunk.judging(part, margin)
         every = residual(model, samples) ** 2
         squares, moving = every[held], samples.moving[held]
-        slid = _as_fast_as_known(samples, model)[held]
+        slid = moving & ~too_slow(model, samples)[held]
         labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples)
         sums, sliding = {}, {}
         for label in np.unique(labels[held]):
@@ -166,12 +167,6 @@ class Tally:
             mean = errors[enough] / counts[enough]
             found.append(float(np.sqrt(np.quantile(mean, 0.9))) if many else None)
         return found
-
-
-def _as_fast_as_known(samples: Samples, model: ReconstructedModel) -> Mask:
-    """(N, n) moving samples around which a joint is no slower than it slid where the model was fitted."""
-    slowest = model.history.get("slowest")
-    return samples.moving & (held_speed(samples) >= np.asarray(slowest)) if slowest else samples.moving
 
 
 def _places(samples: Samples, model: ReconstructedModel) -> dict[str, Mask]:

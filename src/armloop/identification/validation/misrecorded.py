@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from armloop.data.creep import creeping
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
 from armloop.identification.reconstruction.plain_fits import AS_GOOD, FAR
@@ -67,10 +68,19 @@ def _relative(error: Array, samples: Samples) -> Array:
 
 
 def _usual(model: ReconstructedModel, samples: Samples) -> Array:
-    """(n,) what the model leaves on the worst tenth of its own baseline data, over torque; 0 where nobody knows."""
-    worst = np.resize([float(x or 0.0) for x in model.baseline.get("worst") or [0.0]], samples.motion.joints)
+    """(n,) what the model leaves of its own baseline data, over torque; 0 where nobody knows.
+
+    As on the worst tenth of them where a joint slides, and of the samples in which it creeps as on those in which it crept.
+    """
+    n, ranges = samples.motion.joints, model.history.get("range")
+    worst, slow = (
+        np.resize([float(x or 0.0) for x in model.baseline.get(key) or [0.0]], n)
+        for key in ("worst", "creeping")
+    )
+    creeps = creeping(samples, np.asarray(ranges[1]) if ranges else np.zeros(n)).sum(axis=0)
+    left = np.sqrt(worst**2 + slow**2 * creeps / np.maximum(samples.moving.sum(axis=0), 1))
     tau = np.sqrt(np.mean(samples.tau**2, axis=0, where=samples.moving | ~samples.moving.any(axis=0)))
-    return np.asarray(worst / np.maximum(tau, TINY))
+    return np.asarray(left / np.maximum(tau, TINY))
 
 
 def _far_better(left: Array, other: Array, usual: Array) -> bool:
