@@ -62,8 +62,7 @@ def test_collect(
     assert plant_for(asked[0]).arm.joint_names == ["j1", "j2"] and capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("options", LOCKED)
-@pytest.mark.parametrize("command", ["track", "tune"])
+@pytest.mark.parametrize(("command", "options"), [("track", LOCKED[0]), ("tune", LOCKED[1])])
 def test_a_scenarios_arm(
     command: str, options: list[str], place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

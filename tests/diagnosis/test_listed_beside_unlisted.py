@@ -36,7 +36,7 @@ def told(
 @pytest.mark.parametrize(
     ("seed", "effect", "listed", "key"),
     [
-        (1, "viscous_friction", lambda q, v: v[:, 1], "coefficient"),
+        pytest.param(1, "viscous_friction", lambda q, v: v[:, 1], "coefficient", marks=pytest.mark.long),
         (2, "torque_offset", lambda q, v: np.ones(len(v)), "offset"),
     ],
 )

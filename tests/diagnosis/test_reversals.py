@@ -105,7 +105,7 @@ def test_of_joints_that_never_turned_round_in_the_training_logs_nothing_is_said_
     assert {(e["effect"], e["joint"]) for e in effects} == {("presliding_hysteresis", j) for j in (1, 2)}
 
 
-@pytest.mark.parametrize("seed", [7, 8, 9])
+@pytest.mark.parametrize("seed", [7, *(pytest.param(k, marks=pytest.mark.long) for k in (8, 9))])
 def test_a_clean_run_shows_nothing_at_its_reversals(seed: int) -> None:
     model = coulomb_and_viscous(run(90, memory=False))
     answer = diagnose(model, [run(seed, memory=False)]).to_dict()

@@ -24,6 +24,25 @@ def test_it_is_the_recursion(samples):
         np.testing.assert_allclose(stop_operator(q, width), sample_by_sample(q, width, [0]), atol=1e-11)
 
 
+@pytest.mark.parametrize("counts", [None, 2])
+def test_between_turns_and_rests_it_is_the_recursion(counts):
+    """Joints that turn seldom, and not together; read by coarse encoders they rest as well."""
+    t = np.linspace(0, 9, 700)
+    q = np.column_stack([np.sin(t), t, 0.2 * np.cos(3 * t + 1), np.clip(np.sin(2 * t), -0.5, 0.5)])
+    q = q if counts is None else np.round(q, counts)
+    for width in (1e-3, 0.03, 0.4, 3.0):
+        z = stop_operator(q, width, [0, 301])
+        np.testing.assert_allclose(z, sample_by_sample(q, width, [0, 301]), atol=1e-11)
+        assert np.abs(z).max() <= 1
+        np.testing.assert_allclose(z[:, 1], stop_operator(q[:, 1], width, [0, 301]), atol=1e-11)
+
+
+def test_a_run_begins_as_it_is_said():
+    q = np.linspace(0, 1, 11)
+    z = stop_operator(q, 0.5, [0, 6], [-1.0, 0.5])
+    np.testing.assert_allclose(z, [-1, -0.8, -0.6, -0.4, -0.2, 0, 0.5, 0.7, 0.9, 1, 1], atol=1e-12)
+
+
 def test_a_run_begins_relaxed():
     q = np.random.default_rng(0).normal(size=200).cumsum()
     starts = [0, 40, 41, 150]

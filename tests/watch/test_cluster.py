@@ -13,7 +13,7 @@ from armloop.watch import Options, watch
 from armloop.watch.sources import find_logs
 
 distributed = pytest.importorskip("distributed")
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 BESIDE = ("healthy", "2026-01-01")
 
 

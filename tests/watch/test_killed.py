@@ -55,6 +55,7 @@ def small(tmp_path_factory: pytest.TempPathFactory, fleet: Path) -> Path:
     return root
 
 
+@pytest.mark.long
 def test_killed_at_random_moments(small: Path, tmp_path: Path) -> None:
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     words = ["--models", str(small / "models"), "--logs", str(small / "logs"), "--sums-only"]

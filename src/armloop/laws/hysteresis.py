@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 from armloop.util.functions import Functions
 
-#: Maps z -> clip(z + shift, lower, upper), one per sample, arrays of one shape.
+#: Maps z -> clip(z + shift, lower, upper), one per turn of the motion, arrays of one shape.
 _Maps = tuple[Array, Array, Array]
 
 
@@ -51,12 +51,25 @@ def stop_operator(q: Array, width: float, starts: ArrayLike = (0,), initial: Arr
     q = np.asarray(q, dtype=float)
     if len(q) == 0:
         return np.zeros_like(q)
-    lower, upper = np.full_like(q, -width), np.full_like(q, width)
+    first, moved = np.asarray(starts, dtype=int), np.diff(q, axis=0, prepend=q[:1])
+    turns = _turns(np.sign(moved), first)
+    lower, upper = np.full_like(q[turns], -width), np.full_like(q[turns], width)
     # maps that forget: whatever z was, it is the initial state now
-    first = np.asarray(starts, dtype=int)
-    lower[first] = upper[first] = width * np.asarray(initial, dtype=float)
-    shift, lower, upper = _compose_all((np.diff(q, axis=0, prepend=q[:1]), lower, upper))
-    return np.clip(shift, lower, upper) / width
+    begin = np.searchsorted(turns, first)
+    lower[begin] = upper[begin] = width * np.asarray(initial, dtype=float)
+    shift, lower, upper = _compose_all((np.diff(q[turns], axis=0, prepend=q[:1]), lower, upper))
+    # from there to the next turn the joint moves one way, so that one clip is all that comes after
+    last, length = np.clip(shift, lower, upper) - q[turns], np.diff(turns, append=len(q))
+    return np.clip(q + np.repeat(last, length, axis=0), -width, width) / width
+
+
+def _turns(way: Array, first: Index) -> Index:
+    """Samples, the first of each run and of all among them, between two of which no joint turns round or comes to rest."""
+    turned = np.zeros(len(way), dtype=bool)
+    other = way[1:] != way[:-1]
+    turned[:-1] = other if way.ndim == 1 else other.any(axis=1)
+    turned[0] = turned[first] = True
+    return np.flatnonzero(turned)
 
 
 def stop_step(z: Any, shift: Any, width: Any, functions: Functions) -> Any:
@@ -67,14 +80,15 @@ def stop_step(z: Any, shift: Any, width: Any, functions: Functions) -> Any:
 def _compose(inner: _Maps, outer: _Maps) -> _Maps:
     """The clipped shifts outer(inner(z)): clipped shifts are closed under composition."""
     shift, lower, upper = outer
-    return inner[0] + shift, np.clip(inner[1] + shift, lower, upper), np.clip(inner[2] + shift, lower, upper)
+    low, high = (np.minimum(np.maximum(bound + shift, lower), upper) for bound in inner[1:])
+    return inner[0] + shift, low, high
 
 
 def _compose_all(maps: _Maps) -> _Maps:
-    """For every sample the composition of its map with all earlier ones: a scan of log2 N passes, O(N) work.
+    """For every map its composition with all earlier ones: a scan of log2 N passes, O(N) work.
 
     Neighbours are composed in pairs, the pairs are scanned by recursion, and each result serves its odd
-    sample directly and its even successor after one more composition.
+    map directly and its even successor after one more composition.
     """
     N = len(maps[0])
     if N == 1:

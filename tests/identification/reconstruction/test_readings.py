@@ -126,7 +126,7 @@ def test_a_joint_that_is_explained_well_says_nothing_of_another_that_is_not() ->
     check_torques([upright_axes(2, 0.0, slower=4.0, rubbing=0.1)], load_arm("scara"), 10.0)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3))])
 def test_laws_as_strong_as_gravity_are_no_other_reading(seed: int) -> None:
     """Ripple, a spring between joints, a coupled wrist's friction, and one joint's speed as another's friction."""
     motion = fourier_motion(30.0, 100.0, seed)
