@@ -209,6 +209,17 @@ def test_broken_and_foreign_logs_are_set_aside_with_their_reason(fleet: Path, tm
     assert (again.counts.read, len(again.aside)) == (1, 2)
 
 
+def test_a_log_is_aside_for_what_the_last_call_says_of_it(fleet: Path, tmp_path: Path) -> None:
+    logs, models = tmp_path / "logs", tmp_path / "models"
+    (logs / "stranger").mkdir(parents=True)
+    (logs / "stranger" / "broken.csv").write_text("time,q1,v1,tau1\n0,1,2\n", encoding="utf-8")
+    watch(fleet / "models", find_logs([logs]), tmp_path / "store")
+    models.mkdir()
+    shutil.copy(fleet / "models" / "healthy.json", models / "stranger.json")
+    (aside,) = watch(models, find_logs([logs]), tmp_path / "store").aside
+    assert "no model" not in aside["reason"]
+
+
 def test_a_log_that_was_broken_is_no_longer_aside_once_it_is_whole_or_gone(
     fleet: Path, tmp_path: Path
 ) -> None:

@@ -125,8 +125,12 @@ class Store:
             aside.unlink(missing_ok=True)
 
     def set_aside(self, log: str, model: str, about: dict[str, Any]) -> None:
-        """Remember why a log was not used."""
-        _write(self.folder / "aside" / f"{log}-{model}.json", about)
+        """Remember why a log was not used, in place of what was said of it with other models or none."""
+        path = self.folder / "aside" / f"{log}-{model}.json"
+        _write(path, about)
+        for former in self.folder.glob(f"aside/{log}-*.json"):
+            if former != path:
+                former.unlink(missing_ok=True)
 
     def aside(self) -> list[dict[str, Any]]:
         """What was set aside, in the order of the names."""
