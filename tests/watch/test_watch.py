@@ -258,6 +258,47 @@ def test_that_there_is_no_log_is_said(
     assert f"warning: {empty}: holds no log" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("stream", ["empty", "closed"])
+def test_that_standard_input_names_no_log_is_said(
+    fleet: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    stream: str,
+) -> None:
+    call = ["watch", "--models", str(fleet / "models"), "--logs", "-", "--store", str(tmp_path / "store")]
+    with open(os.devnull, encoding="utf-8") as empty:
+        monkeypatch.setattr("sys.stdin", empty if stream == "empty" else None)
+        assert main(call) == 2
+    said = capsys.readouterr().err
+    assert "standard input: holds no log" in said and said.count("\n") == 1
+
+
+def test_a_listed_log_that_is_gone_stops_nothing(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good = sorted((fleet / "logs" / "healthy").iterdir())[0]
+    (tmp_path / "list").write_text(f"{tmp_path / 'gone.csv'}\n{good}\n", encoding="utf-8")
+    call = ["watch", "--models", str(fleet / "models"), "--logs", "-", "--store", str(tmp_path / "store")]
+    with (tmp_path / "list").open(encoding="utf-8") as listed:
+        monkeypatch.setattr("sys.stdin", listed)
+        assert main([*call, "--sums-only", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["logs"] == {"read": 1, "known": 0, "set_aside": 1}
+    assert "gone.csv: cannot be read (No such file" in answer["set_aside"][0]["reason"]
+
+
+def test_listed_logs_are_taken_as_many_at_a_time_as_there_are() -> None:
+    read, write = os.pipe()
+    with os.fdopen(read, encoding="utf-8") as stream:
+        os.write(write, b"a.csv\nb.csv\n\nc d.csv\n")
+        batches = watch_command._batches(stream)
+        assert next(batches) == ["a.csv", "b.csv", "c d.csv"]
+        os.write(write, b"e.csv")
+        os.close(write)
+        assert list(batches) == [["e.csv"]]
+
+
 def test_recordings_of_other_formats_are_not_passed_over_in_silence(tmp_path: Path) -> None:
     arm = tmp_path / "logs" / "arm7"
     arm.mkdir(parents=True)
@@ -272,9 +313,10 @@ def test_a_link_to_a_log_that_is_gone_is_said(fleet: Path, tmp_path: Path) -> No
     logs = tmp_path / "logs" / "healthy"
     logs.mkdir(parents=True)
     (logs / "gone.csv").symlink_to(tmp_path / "archive" / "gone.csv")
-    with pytest.warns(InputWarning, match=r"set aside: .*gone\.csv: cannot be read \(No such file"):
-        outcome = watch(fleet / "models", find_logs([logs.parent]), tmp_path / "store")
+    outcome = watch(fleet / "models", find_logs([logs.parent]), tmp_path / "store")
     assert outcome.counts.aside == 1
+    (aside,) = outcome.aside
+    assert aside["arm"] == "healthy" and "gone.csv: cannot be read (No such file" in aside["reason"]
     (card,) = [card for card in _cards(outcome) if card.title == "set aside"]
     assert card.figure == "1"
 

@@ -82,9 +82,9 @@ def run(options: Watch) -> int:
     tell = progress(options)
     told: list[str] = []
     diagnosed: list[str] = []
-    outcome, counts = None, Counts()
+    counts = Counts()
     for places in _batches(sys.stdin) if options.logs == ["-"] else [options.logs]:
-        files = _found(places, options.store)
+        files = _found(places, options.store, options.logs == ["-"])
         if options.arm is not None and options.logs != ["-"]:
             _require_arm(options.arm, files, options.store)
         outcome = watch(options.models, files, options.store, how, tell)
@@ -96,8 +96,6 @@ def run(options: Watch) -> int:
         told += outcome.new
         diagnosed += outcome.diagnosed
         counts += outcome.counts
-    if outcome is None:
-        outcome = watch(options.models, [], options.store, how, tell)
     outcome = replace(outcome, counts=counts, diagnosed=diagnosed)
     if options.report is not None:
         from armloop.reports.watch_report import watch_report
@@ -117,8 +115,11 @@ def run(options: Watch) -> int:
     return NEW_ALARM if told else 0
 
 
-def _found(places: Sequence[str], store: str) -> list[LogFile]:
+def _found(places: Sequence[str], store: str, listed: bool) -> list[LogFile]:
     """The logs in these places; that there are none is said: to a job that looks at the status alone, all would be well.
+
+    Args:
+        listed: the places came on standard input.
 
     Raises:
         InputError: there are none, and the store has none, either.
@@ -128,9 +129,10 @@ def _found(places: Sequence[str], store: str) -> list[LogFile]:
     from armloop.util.doubts import warn
     from armloop.watch.sources import find_logs
 
-    files = find_logs(places)
+    files = find_logs(places, listed)
     if not files:
-        said = f"{', '.join(places)}: holds no log; --logs takes DIR/ARM/*.csv or *.parquet"
+        where = ", ".join(places) or "standard input"
+        said = f"{where}: holds no log; --logs takes DIR/ARM/*.csv or *.parquet, or - for a list of them"
         if not any(Path(store).glob("sums/*/*/*.parquet")):
             raise InputError(said)
         warn(said)
@@ -158,16 +160,23 @@ def _announce(store: str, names: Sequence[str]) -> None:
         Store(store).announce(names)
 
 
-def _batches(stream: TextIO) -> Iterator[list[str]]:
-    """Paths that standard input brings, as many at a time as there are."""
+def _batches(stream: TextIO | None) -> Iterator[list[str]]:
+    """Paths that standard input brings, as many at a time as there are; nothing, once, if it ends without any."""
+    import os
     import select
 
-    waiting: list[str] = []
-    for line in stream:
-        if line.strip():
-            waiting.append(line.strip())
-        if waiting and not select.select([stream], [], [], 0.2)[0]:
+    if stream is None:  # it was closed
+        yield []
+        return
+    # by its number: what a text stream has read ahead, `select` does not see
+    source, text, ended, any_yet = stream.fileno(), b"", False, False
+    while not ended:
+        read = os.read(source, 65536)
+        text, ended = text + read, not read
+        if not ended and select.select([source], [], [], 0.2)[0]:
+            continue
+        *whole, text = (*text.split(b"\n"), b"") if ended else text.split(b"\n")
+        waiting = [path for line in whole if (path := os.fsdecode(line).strip())]
+        if waiting or (ended and not any_yet):
+            any_yet = True
             yield waiting
-            waiting = []
-    if waiting:
-        yield waiting

@@ -10,7 +10,6 @@ from armloop.data.signals import ShortRunError
 from armloop.model import ReconstructedModel
 from armloop.monitoring.sums import LogSums, RestingError, log_sums
 from armloop.regression.moments import Sums
-from armloop.util.doubts import warn
 from armloop.util.errors import InputError, LogError
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Workers
@@ -49,14 +48,15 @@ def ingest(
     files: Sequence[LogFile],
     workers: Workers,
     progress: Progress = silent,
-) -> tuple[Counts, dict[str, Path]]:
+) -> tuple[Counts, dict[str, Path], list[dict[str, str]]]:
     """Bring new logs into the store.
 
     Returns:
-        Counts, and where each log that there is lies, by its digest.
+        Counts, where each log that there is lies, by its digest, and those that cannot be opened, as they are said to be
+        set aside; the store knows logs by what they hold.
     """
     known, aside = store.known(), store.known_aside()
-    counts, places = Counts(), {}
+    counts, places, closed = Counts(), {}, []
     todo: dict[tuple[str, Path], list[tuple[LogFile, str]]] = {}
     tell = paced(progress)
     for index, file in enumerate(files):
@@ -65,7 +65,7 @@ def ingest(
             digest = file.digest()
         except InputError as error:
             counts += Counts(aside=1)
-            warn(f"set aside: {error}")
+            closed.append({"arm": file.arm, "log": str(file.path), "reason": str(error)})
             continue
         if digest in places:
             counts += Counts(known=1)
@@ -99,7 +99,7 @@ def ingest(
         done += answer.read + answer.aside
         tell(f"read {done} of {total} new logs")
     store.prune_aside({str(path): digest for digest, path in places.items()})
-    return counts, places
+    return counts, places, closed
 
 
 def _put_aside(

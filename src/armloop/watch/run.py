@@ -100,7 +100,7 @@ def watch(
         folder = Store(store)
         held.enter_context(_leaving_nothing(folder))
         held.enter_context(folder.locked(options.scheduler is not None))
-        counts, places = ingest(folder, known, files, workers, progress)
+        counts, places, closed = ingest(folder, known, files, workers, progress)
         kept = {log for log, _ in folder.known()}
         places = {log: path.resolve() for log, path in places.items() if log in kept}
         tasks = []
@@ -125,7 +125,7 @@ def watch(
         told, after = folder.announced(), _diagnosed(folder) - before
         new = [alarm["id"] for alarm in alarms if alarm["id"] not in told]
         late = [alarm["id"] for alarm in alarms if alarm["id"] in told & after]
-        return Outcome(counts, arms, alarms, new, folder.aside(), options.hours, late)
+        return Outcome(counts, arms, alarms, new, [*closed, *folder.aside()], options.hours, late)
 
 
 def _standing(alarms: list[dict[str, Any]], arms: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

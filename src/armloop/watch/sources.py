@@ -71,11 +71,14 @@ class Recording:
     when: float
 
 
-def find_logs(places: Sequence[str | Path]) -> list[LogFile]:
+def find_logs(places: Sequence[str | Path], listed: bool = False) -> list[LogFile]:
     """The logs in folders, DIR/ARM/[PROGRAMME/]FILE, and single files, whose arm is their folder; sorted by path.
 
     Recordings of other formats in the folders are passed over, and that is said: an arm whose recorder was changed must
     not look like one that is well.
+
+    Args:
+        listed: the places are of a list that was made some time ago: one that is gone is a log that cannot be read.
 
     Raises:
         InputError: a place does not exist.
@@ -96,7 +99,7 @@ def find_logs(places: Sequence[str | Path]) -> list[LogFile]:
                 found[path] = LogFile(
                     path, arm, _programme(inside[1:]), (*reversed(inside), place.resolve().name)
                 )
-        elif place.is_file():
+        elif place.is_file() or listed:
             folder = place.resolve().parent.name
             found[place] = LogFile(place, folder, "", (folder,))
         else:
@@ -238,10 +241,3 @@ def recorded_at(file: LogFile, first: float) -> float:
 def day_of(when: float) -> str:
     """The day, UTC, as 2026-11-22."""
     return datetime.fromtimestamp(when, UTC).strftime("%Y-%m-%d")
-
-
-def lines(stream: Iterator[str]) -> Iterator[str]:
-    """The paths that come line by line, blank ones left out."""
-    for line in stream:
-        if line.strip():
-            yield line.strip()
