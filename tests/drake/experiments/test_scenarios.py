@@ -101,6 +101,10 @@ def test_a_file_may_hold_several_scenarios(tmp_path):
         load_tracking(f"{_written(path, TWO.replace('  score: []', '  Kp: []'))}:slow")
     with pytest.raises(ScenarioError, match=r"holds one scenario without a name; leave out :slow"):
         load_tracking(f"{_written(path, 'plant: three_axis')}:slow")
+    # nothing below one of the names is told of that name, and hides no other
+    assert load_tracking(f"{_written(path, TWO + 'later:')}:slow").name == "mine:slow"
+    with pytest.raises(ScenarioError, match=r"mine.yaml: later is None; it must be a mapping of fields"):
+        load_tracking(f"{path}:later")
     # one with a field that is misspelt is no file of several
     with pytest.raises(ScenarioError, match=r"mine.yaml: field 'limts' is unknown"):
         load_tracking(_written(path, "plant: three_axis\nlimts: {effort: [9.0]}"))
@@ -185,7 +189,7 @@ def test_a_reference_from_a_file(tmp_path):
         ),
         ("plant: three_axis\nreference: {unit: 1.0}\n", "joint 1 would go from"),
         ("plant: three_axis\nreference: {periods: 0}\n", "reference.periods is 0"),
-        ("plant: scara\n", "reference: the paper's is for 3 joints; scara has 4"),
+        ("plant: scara\n", "reference: the paper's is for 3 joints; scara has 4: give kind: fourier"),
         ("plant: three_axis\nrandom_seed: soon\n", "random_seed is 'soon'; it must be a whole number"),
         (OWN.replace("three_axis", "nowhere"), "own_plant: arm: .*no such file"),
         (OWN.replace("arm: three_axis", "arm: scara"), "friction has 3 joints; scara has 4"),

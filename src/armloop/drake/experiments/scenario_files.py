@@ -65,7 +65,8 @@ def scenario_entry(spec: str | Path, schema: type[T]) -> tuple[Path, str, str, T
     path, wanted = find_scenario(spec)
     raw = read(path)
     fields = {field.name for field in msgspec.structs.fields(schema)}  # type: ignore[arg-type]
-    several = raw and all(key not in fields and isinstance(value, Mapping) for key, value in raw.items())
+    # a name may have nothing below it yet, which is then said of it
+    several = fields.isdisjoint(raw) and any(isinstance(value, Mapping) for value in raw.values())
     if not several:
         if wanted is not None:
             raise ScenarioError(f"{path}: holds one scenario without a name; leave out :{wanted}")

@@ -40,7 +40,9 @@ def reference_of(
     """
     if data.kind == "paper":
         if arm.n != 3:
-            raise ScenarioError(f"{where}: reference: the paper's is for 3 joints; {arm.name} has {arm.n}")
+            raise ScenarioError(
+                f"{where}: reference: the paper's is for 3 joints; {arm.name} has {arm.n}: give kind: fourier, places or csv"
+            )
         reference: Reference = paper_reference(data.unit, data.periods)
     elif data.kind == "fourier":
         reference = fourier_reference(ranges, data.duration, seed)
