@@ -142,7 +142,10 @@ def test_a_library_is_one_object(logs: list[MotionLog], monkeypatch: pytest.Monk
 
     monkeypatch.setitem(LIBRARIES, "own", Own())
     found = reconstruct(logs[:1], three_axis(), library="own", options=PLAIN)
-    assert found.model.history["library"] == "own" and [one.name for one in found.libraries] == ["own"]
+    (only,) = found.to_dict()["libraries"]
+    assert found.model.history["library"] == "own" and only["library"] == "own" and only["chosen"]
+    friction = sum(map(len, found.model.friction.terms))
+    assert only["coefficients"] == len(found.model.components[0].values) + friction  # no effect was added
     assert "own" not in [one.name for one in candidates(three_axis(), PLAIN)]
     with pytest.raises(
         InputError, match=r"its friction is its own; laws are chosen with --library rigid-body or lag"

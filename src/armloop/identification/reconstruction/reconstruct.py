@@ -221,7 +221,8 @@ def _compared(
     left = [one for one in wanted if one not in refused]
     tried = [Contender(one, refused=why) for one, why in refused.items()]
     if len(left) == 1:
-        tried += [Contender(one, attempt(one), chosen=True) for one in left]
+        made = attempt(left[0])
+        tried.append(Contender(left[0], made, coefficients=made.coefficients(), chosen=True))
         return sorted(tried, key=lambda one: wanted.index(one.library)), "all"
     # half of the held-out blocks may be too few to judge by; a fold of the others then chooses the library
     few = len(left) > 1 and ready.few_held_out(wanted[0].conditioning)
