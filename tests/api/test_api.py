@@ -128,6 +128,7 @@ def test_a_diagnosis_has_objects_for_effects(model, found, tmp_path):
     assert added.parameters["coefficient"].value == pytest.approx(0.8, abs=0.08)
     assert found.error["after"][1] < 0.5 * found.error["before"][1]
     assert isinstance(found.model, al.Model) and len(found.model.effects) == 1
+    assert ", 1 effect added" in repr(found.model)
     assert found.model.score(run(20, 5, 0.8)).rmse[1] < model.score(run(20, 5, 0.8)).rmse[1]
     assert "\n" not in repr(found) and "viscous_friction at joint 2" in repr(found)
     assert "viscous" in str(found) and "<img" in found._repr_html_() and found.plot().axes

@@ -25,6 +25,7 @@ from armloop.model import ReconstructedModel
 from armloop.model import load_model as read_model
 from armloop.regression.sparse import Sparse
 from armloop.reports.tables import formulas, score_table, steps_table
+from armloop.reports.words import counted
 from armloop.robot.arm import Arm
 from armloop.robot.levelling import of_a_lean, of_a_zero
 from armloop.util.errors import InputError
@@ -123,7 +124,7 @@ class Model(ReconstructedModel):
         known = [x for x in errors if x is not None]
         error = f", {'held-out' if held_out else 'baseline'} nRMSE {np.mean(known):.3g}" if known else ""
         kinds = ", ".join(dict.fromkeys(component.kind for component in self.components))
-        more = f", {len(self.effects)} effects added" if self.effects else ""
+        more = f", {counted(len(self.effects), 'effect')} added" if self.effects else ""
         return f"<armloop.Model of {self.arm.name}, {self.arm.n} joints: {kinds}{more}{error}>"
 
     def __str__(self) -> str:
