@@ -3,7 +3,7 @@
 import inspect
 import subprocess
 import sys
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from inspect import getattr_static
 
 import numpy as np
@@ -119,6 +119,17 @@ def test_a_model_scores_plots_and_shows_itself(model, tmp_path):
     with pytest.raises(InputError, match="report"):
         again.report(tmp_path / "other.html")
     assert again.export("c", tmp_path / "arm.c").files == [tmp_path / "arm.c"]
+
+
+def test_what_is_in_amperes_is_said_to_be(model, tmp_path):
+    log = run(20, 4)
+    current = MotionLog(log.time, log.q, log.v, log.tau, name="current", tau_unit="A")
+    drives = replace(model, recorded={"unit": "A", "drive_gains": None}, logs=())
+    score = drives.score(current)
+    page = score.report(tmp_path / "score.html").read_text()
+    axes = [one.get_ylabel() for one in drives.plot(current).axes]
+    assert "N·m" not in str(score) and "N·m" not in page and axes[0] == "current [A]"
+    assert "N·m" in str(model.score(log)) and str(score).count(" A ") == 3
 
 
 def test_a_diagnosis_has_objects_for_effects(model, found, tmp_path):

@@ -132,7 +132,7 @@ class Model(ReconstructedModel):
         if self.account is not None:
             parts += [
                 str(steps_table(self.account.reports)),
-                str(score_table(self.account.held_out, self.arm)),
+                str(score_table(self.account.held_out, self.arm, units=self.torque_units)),
             ]
         parts.append("\n".join([formulas(self), *self.legend()]))
         parts += [added.effect.sentence(added.parameters) for added in self.effects]

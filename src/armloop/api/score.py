@@ -32,6 +32,7 @@ class Score(Numbers):
     """Errors per joint: ``overall``, ``moving`` and ``standstill``, each with lists ``rmse`` and ``nrmse``."""
 
     arm: Arm | None = None
+    units: tuple[str, ...] = ()
 
     @property
     def rmse(self) -> list[float | None]:
@@ -49,7 +50,7 @@ class Score(Numbers):
 
     def __str__(self) -> str:
         assert self.arm is not None
-        return str(score_table(self, self.arm))
+        return str(score_table(self, self.arm, units=self.units))
 
     def _repr_html_(self) -> str:
         return page(str(self), self.plot())
@@ -66,7 +67,7 @@ class Score(Numbers):
         from armloop.reports.score_report import score_report
 
         assert self.arm is not None
-        write_text(path, score_report(self, self.arm))
+        write_text(path, score_report(self, self.arm, self.units))
         return Path(path)
 
 
@@ -77,7 +78,8 @@ def evaluate(model: ReconstructedModel, logs: MotionLog | Sequence[MotionLog]) -
         InputError: a log does not fit the model's arm or its unit of torque.
     """
     found = score(model, samples_for(model, as_logs(logs)))
-    return Score(**{f.name: getattr(found, f.name) for f in fields(Numbers)}, arm=model.arm)
+    numbers = {f.name: getattr(found, f.name) for f in fields(Numbers)}
+    return Score(**numbers, arm=model.arm, units=tuple(model.torque_units))
 
 
 def logs_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> list[MotionLog]:

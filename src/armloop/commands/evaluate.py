@@ -42,4 +42,4 @@ def run(options: Evaluate) -> None:
     if options.json:
         print_json(result.to_dict())
         return
-    print(score_table(result, model.arm))
+    print(score_table(result, model.arm, units=model.torque_units))

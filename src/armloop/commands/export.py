@@ -70,7 +70,7 @@ def _tell(found: Exported, model: ReconstructedModel, by_log: bool) -> None:
         print(f"read back by {found.consumer}, on {states}; largest difference of torque:")
         rows = []
         for j, joint in enumerate(model.arm.joints):
-            of = "A" if model.in_amperes else unit(joint.torque_unit)
+            of = unit(model.torque_units[j])
             values = (found.rms[j], found.difference[j], found.unsaid[j])
             rows.append([f"{j + 1}  {joint.name}", of, *(f"{x:.3g}" for x in values)])
         heads = ["joint", "unit", "RMS of the model", "of what it can say", "of the whole model"]

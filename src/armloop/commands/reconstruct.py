@@ -156,7 +156,8 @@ def run(options: Reconstruct) -> None:
         for table in (coefficients_table(result.model), stribeck_table(result.model)):
             print(table, end="\n\n") if table else None
         print(wrapped(NOTE), end="\n\n")
-    print(score_table(result.held_out, arm, "Prediction error on held-out blocks"), end="\n\n")
+    units = result.model.torque_units
+    print(score_table(result.held_out, arm, "Prediction error on held-out blocks", units), end="\n\n")
     print(parts_table(result.parts, arm))
     for note in [*unjudged(result.parts), *result.notes]:
         print(wrapped(f"note: {note}"))

@@ -80,6 +80,11 @@ class ReconstructedModel:
         return self.recorded["unit"] == "A" and self.recorded["drive_gains"] is None
 
     @property
+    def torque_units(self) -> list[str]:
+        """Of what it predicts, joint by joint: "N*m" (revolute), "N" (prismatic) or "A"."""
+        return ["A"] * self.arm.n if self.in_amperes else self.arm.torque_units
+
+    @property
     def ranges(self) -> Array:
         """(4, n) how far q, v and v̇ went where the model was fitted, and the middle of q; a guess where it is not kept."""
         n = self.arm.n

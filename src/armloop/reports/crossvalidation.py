@@ -36,7 +36,7 @@ def crossvalidation_tables(result: CrossValidation) -> list[Table]:
         ["log", *joints, "mean", "samples"], rows, f"nRMSE of the moving joints on data left out: {what}"
     )
     still = [[f.name, *f.score.standstill["rmse"]] for f in result.files]
-    standstill = make_table(["log", *joints], still, "RMSE at standstill [N·m or N], not in the means")
+    standstill = make_table(["log", *joints], still, "RMSE at standstill [N·m, N or A], not in the means")
     return [moving, standstill]
 
 

@@ -114,7 +114,9 @@ def reconstruction_sections(
     if samples is not None:
         pictures.append(Picture(torque_figure(model, samples), say["torque"]))
         pictures.append(Picture(friction_figure(model, samples), say["friction"]))
-    judged = score_table(reconstruction.held_out, model.arm, "Prediction error on held-out blocks")
+    judged = score_table(
+        reconstruction.held_out, model.arm, "Prediction error on held-out blocks", model.torque_units
+    )
     tables = [steps_table(reconstruction.reports), judged]
     if compared(reconstruction.libraries):
         tables.insert(0, libraries_table(reconstruction.libraries))

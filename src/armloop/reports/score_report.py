@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from matplotlib.figure import Figure
 
 from armloop.identification.scoring import Score
@@ -27,11 +29,13 @@ def score_figure(score: Score, arm: Arm) -> Figure:
     return made
 
 
-def score_report(score: Score, arm: Arm) -> str:
-    """One HTML page on a score."""
+def score_report(score: Score, arm: Arm, units: Sequence[str] = ()) -> str:
+    """One HTML page on a score, in units, if they are not those of torques."""
     say = Prose("score", score=score)
     picture = Picture(score_figure(score, arm), say["errors"])
-    section = Section("Prediction error", say.paragraphs("text"), [picture], [score_table(score, arm)])
+    section = Section(
+        "Prediction error", say.paragraphs("text"), [picture], [score_table(score, arm, units=units)]
+    )
     card = Card(percent(mean_nrmse(score)), "Prediction error", "nRMSE while moving, mean of the joints")
     return render(
         Report(f"A model of {arm.name}, evaluated", "Predicted and measured torques.", [section], [card])

@@ -223,14 +223,16 @@ def _least(checks: PhysicsChecks) -> str | float:
     return checks.least
 
 
-def score_table(score: Score, arm: Arm, title: str | None = "Prediction error") -> Table:
-    """RMSE and nRMSE per joint, of the moving joint and at standstill."""
-    rows = []
+def score_table(
+    score: Score, arm: Arm, title: str | None = "Prediction error", units: Sequence[str] | None = None
+) -> Table:
+    """RMSE and nRMSE per joint, of the moving joint and at standstill; in units, if they are not those of torques."""
+    rows, units = [], units or arm.torque_units
     for j, joint in enumerate(arm.joints):
         rows.append(
             [
                 f"{j + 1}  {joint.name}",
-                unit(joint.torque_unit),
+                unit(units[j]),
                 score.rms[j],
                 score.moving["rmse"][j],
                 percent(score.moving["nrmse"][j]),

@@ -129,7 +129,8 @@ def notes(model: ReconstructedModel) -> list[str]:
     for j, T in enumerate(model.uncertainty.get("between_logs") or []):
         if T is not None:
             joint = model.arm.joints[j]
-            unit, slope_unit = joint.torque_unit, f"{joint.torque_unit}*s/{joint.position_unit}"
+            unit = model.torque_units[j]
+            slope_unit = f"{unit}*s/{joint.position_unit}"
             level, slope = np.sqrt(np.maximum(np.diag(T), 0.0))
             found.append(
                 f"joint {j + 1}: friction differs between the logs by more than chance, by a standard deviation of "

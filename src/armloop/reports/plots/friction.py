@@ -42,7 +42,7 @@ def friction_figure(model: ReconstructedModel, samples: Samples) -> Figure:
             low, high = np.quantile(curves, [0.1, 0.9], axis=0)
             axes.fill_between(speeds, low, high, color=BLUE, alpha=0.2, linewidth=0)
             axes.plot(speeds, np.median(curves, axis=0), color=BLUE, linewidth=2, label="model, sliding")
-        what = f"friction [{unit(joint.torque_unit)}]" if j % _COLUMNS == 0 else ""
+        what = f"friction [{unit(model.torque_units[j])}]" if j % _COLUMNS == 0 else ""
         polish(axes, f"velocity [{unit(joint.position_unit)}/s]", what, f"Joint {j + 1}")
     legend(made, 2)
     return made

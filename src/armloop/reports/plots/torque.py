@@ -36,7 +36,8 @@ def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 
         below.axhline(0.0, color=GRID, linewidth=1)
         trace(below, time, left, color=INK, linewidth=0.8, label="residual of Step III")
         below.margins(x=0.01)
-        what, of = "torque" if joint.kind == "revolute" else "force", unit(joint.torque_unit)
+        what, of = "torque" if joint.kind == "revolute" else "force", unit(model.torque_units[j])
+        what = "current" if model.in_amperes else what
         polish(axes, "", f"{what} [{of}]", f"Joint {j + 1}")
         polish(below, "time [s]" if j == n - 1 else "", f"left [{of}]")
     legend(made, 5)
