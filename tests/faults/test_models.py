@@ -137,6 +137,7 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
         "range",
     ),
     (("history", "slowest"), [None, [0.1], [0.1] * 4, [-0.1] * 3, ["a"] * 3, 0.1, [1e300] * 3], "slowest"),
+    (("history", "velocity_noise"), [None, [0.1], [-0.1] * 3, ["a"] * 3, 0.1, [1e300] * 3], "velocity_noise"),
     (("history", "inertial"), [None, [1.0], "x", [1e300] * 30, 3], "inertial"),
     (("history", "notes"), [3, [3]], "notes"),
     (

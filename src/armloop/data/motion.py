@@ -175,6 +175,7 @@ class Samples:
     wider : corner of the low-pass that the motion has passed, as a multiple of tau's
     unknown : (N, n) true where tau is no measurement of the joint's torque (it counts as not moving); None where all are
     fastest : (n,) largest speed of each joint, rad/s (m/s), infinite where it gets nowhere; None where nobody looked
+    velocity_noise : (n,) noise of each joint's speed that its dead zone goes by, rad/s (m/s); None where there is none
 
     Raises `InputError` when the shapes do not agree.
     """
@@ -188,6 +189,7 @@ class Samples:
     wider: float = 1.0
     unknown: Mask | None = None
     fastest: Array | None = None
+    velocity_noise: Array | None = None
 
     def __post_init__(self) -> None:
         if self.tau.shape != self.motion.q.shape or self.moving.shape != self.motion.q.shape:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from armloop.data.dropouts import later, repaired
 from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
@@ -106,6 +107,10 @@ class Speeds:
         travels = np.ptp(log.q, axis=0) >= _TRAVELS
         return Speeds(velocity_noise(log, cutoff_hz), np.where(travels, fastest, np.inf))
 
+    def as_noisy_as(self, noise: ArrayLike) -> Speeds:
+        """The same, of logs that are no less noisy than (n,) others."""
+        return replace(self, noise=np.maximum(self.noise, noise))
+
     @staticmethod
     def of_all(logs: Sequence[MotionLog], cutoff_hz: float) -> Speeds:
         """Those of several logs."""
@@ -190,6 +195,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, speeds: Speeds | No
         WIDER,
         lost if lost.any() else None,
         speeds.fastest,
+        speeds.noise,
     )
 
 

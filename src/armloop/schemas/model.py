@@ -185,6 +185,7 @@ class HistoryData(Struct):
         UNSET
     )
     slowest: Annotated[list[NotNegative], _Joints] | UnsetType = UNSET
+    velocity_noise: Annotated[list[NotNegative], _Joints] | UnsetType = UNSET
     inertial: Annotated[list[_SUM], Meta(max_length=10 * MOST_JOINTS)] | UnsetType = UNSET
     encoder_zeros: EncoderZerosData | UnsetType = UNSET
     leaning: LeaningData | UnsetType = UNSET
@@ -314,6 +315,7 @@ def _agree(model: ModelData) -> None:
         ),
         *((f"history.range[{k + 1}]", row) for k, row in enumerate(ranges)),
         ("history.slowest", history.slowest),
+        ("history.velocity_noise", history.velocity_noise),
         ("history.encoder_zeros.spread", UNSET if zeros is UNSET else zeros.spread),
         *(
             (f"uncertainty.{key}", getattr(model.uncertainty, key) or None)

@@ -10,7 +10,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 from armloop.data.blocks import folds
 from armloop.data.creep import held_speed
 from armloop.data.log import MotionLog
-from armloop.data.signals import Conditioning, preprocess
+from armloop.data.signals import Conditioning, preprocess, velocity_noise
 from armloop.experiment.excitation import MotionRanges
 from armloop.experiment.sampling import inverse_dynamics_samples
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
@@ -99,6 +99,10 @@ def test_the_model_remembers_how_it_came_about(together: Reconstruction):
     assert (np.abs(motion.q - centre) <= half_q * 1.05).mean() > 0.99
     assert (np.abs(motion.v) <= half_v).mean() > 0.98 and (np.abs(motion.vdot) <= half_a).mean() > 0.98
     assert history["slowest"] == slowest_sliding(samples)
+    # the noisier log's, for that is what counted as motion in both
+    cutoff = together.model.conditioning.cutoff_hz
+    noises = [velocity_noise(a_run(seed), cutoff) for seed in (1, 2)]
+    assert history["velocity_noise"] == np.max(noises, axis=0).tolist()
 
 
 def test_held_out_blocks_do_not_reach_the_model():

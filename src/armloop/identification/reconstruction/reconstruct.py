@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from armloop.data.motion import Samples
 from armloop.data.pieces import IN_MEMORY, LogSource
 from armloop.data.repeats import require_different
 from armloop.data.signals import Conditioning
@@ -258,6 +259,7 @@ def _finished(
             "steps": [report.to_dict() for report in found.reports],
             "range": motion_range(data.reference.samples.motion),
             "slowest": slowest_sliding(data.reference.samples),
+            **_velocity_noise(data.reference.samples),
             **found.history,
         },
     )
@@ -290,6 +292,11 @@ def _finished(
         notes += between_logs_notes(model)
         model = replace(model, history={**model.history, "notes": notes})
     return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
+
+
+def _velocity_noise(samples: Samples) -> dict[str, list[float]]:
+    """What the dead zones of the training logs went by, which those of later logs are no narrower than."""
+    return {} if samples.velocity_noise is None else {"velocity_noise": samples.velocity_noise.tolist()}
 
 
 def _find_ripple(tried: Attempt, logs: Sequence[LogSource]) -> None:
