@@ -150,7 +150,9 @@ class TestReasons:
         monkeypatch.setattr(reasons, "sliding", lambda samples, model: slides)
         monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
         monkeypatch.setattr(
-            reasons, "_multiple", lambda part, j, ratio: (f"{part.joint} {ratio:g}", (False, True, None)[j])
+            reasons,
+            "_multiple",
+            lambda part, j, ratio: (f"{part.joint} {ratio:g}", of.get("real", (False, True, None))[j]),
         )
         augmented: Any = 0.75
         found = reasons.standing(evidence, augmented, after, of.get("explained", []))
@@ -180,6 +182,8 @@ class TestReasons:
         # most, but of joints that can be judged, and one alone is no arm
         assert self.standing(monkeypatch, [1.0, 0.9, 0.9])[0] == ["1 2"]
         assert self.standing(monkeypatch, [1.0, None, 1.0], slides=19)[0][0].startswith("2 of 2 joints")
+        # a stop at the end of the log is felt by all of them, and nothing that the motion tells of
+        assert self.standing(monkeypatch, [1.0, 1.0, 1.0], real=(False,) * 3)[0] == ["1 2", "2 2", "3 2"]
         # a residual that the verdict names is left all the same, unless its law removes it
         words, _ = self.standing(monkeypatch, [1.0, 1.0, 0.9], explained=[1])
         assert words[0].startswith("2 of 3 joints leave") and words[1:] == ["1 2", "2 2"]

@@ -71,7 +71,8 @@ def standing(
     slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
     slides = sliding(samples, model)
     reasons: list[str] = []
-    unknown, unexplained, judged, multiples = False, [], 0, 0
+    unknown, unexplained, judged = False, [], 0
+    multiples: list[bool | None] = []
     for j, part in enumerate(parts):
         reasons += _range(j, float(outside[j]), float(far[j])) + _slow(model, j, float(slow[j]))
         unknown |= bool(far[j] > NEARLY_ALL)
@@ -89,13 +90,14 @@ def standing(
             continue
         words, real = _multiple(part, j, ratio)
         if ratio >= MULTIPLE:
-            multiples += 1
+            multiples.append(real)
             reasons.append(words)
         if j + 1 not in explained:
             unexplained += [j] if real else []
             unknown |= ratio >= MULTIPLE and real is not False
-    if multiples > max(MOSTLY * judged, 1):
-        reasons.insert(0, _all_over(model, multiples, judged))
+    # noise, or what happened once, such as a hard stop that all joints feel, makes no other record
+    if len(multiples) > max(MOSTLY * judged, 1) and any(real is not False for real in multiples):
+        reasons.insert(0, _all_over(model, len(multiples), judged))
     return Standing(reasons, merged(parts, outside), unknown, tuple(unexplained))
 
 
