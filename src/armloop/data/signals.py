@@ -137,7 +137,12 @@ def derivative(x: Array, period: float) -> Array:
     return np.gradient(x, period, axis=0, edge_order=2)
 
 
-def preprocess(logs: Sequence[MotionLog], how: Conditioning, speeds: Speeds | None = None) -> Samples:
+def preprocess(
+    logs: Sequence[MotionLog],
+    how: Conditioning,
+    speeds: Speeds | None = None,
+    felt_hz: float | None = None,
+) -> Samples:
     """Prepare logs for regression: resample, filter, differentiate, trim, decimate.
 
     Each run is put on a uniform grid (cubic splines where its stamps jitter), filtered, and thinned to
@@ -147,6 +152,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, speeds: Speeds | No
 
     Args:
         speeds: what is known from more logs than these.
+        felt_hz: corner below which a lag of v is felt, where several filters are to see the same v; the filter's by default.
 
     Returns:
         The samples of all runs, one after the other; ``moving`` is false within ``smear`` periods of
@@ -161,9 +167,10 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, speeds: Speeds | No
     if speeds is None:
         speeds = Speeds.of_all(logs, how.cutoff_hz)
     parts, spans = [], []
+    felt_hz = how.cutoff_hz if felt_hz is None else felt_hz
     for log in logs:
         lag = log.velocity_lag
-        fresh = repaired(log.record, lag if lag * how.cutoff_hz >= FELT else 0.0)
+        fresh = repaired(log.record, lag if lag * felt_hz >= FELT else 0.0)
         for run in log.runs():
             part = _condition_run(fresh, run, how, how.dead_zone * speeds.noise)
             if part is not None:

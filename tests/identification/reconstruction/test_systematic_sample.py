@@ -64,3 +64,16 @@ def unread(samples: int) -> Any:
 def test_sixty_thousand_samples_are_read(count: int, samples: int, picked: list[int]) -> None:
     taken = systematic_sample.placed_runs([unread(samples) for _ in range(count)])
     assert taken == [(k, slice(0, min(samples, 60_000 // len(picked)))) for k in picked]
+
+
+def test_samples_that_a_filter_takes_out_are_not_counted():
+    logs = [unread(20_000) for _ in range(5)]
+    for log in logs:
+        log.period = 0.001
+    # recorded at 1 kHz: four times as many are read where 250 Hz are left
+    every = systematic_sample.placed_runs(logs, 250.0)
+    assert every == [(k, slice(0, 20_000)) for k in range(5)]
+    some = systematic_sample.placed_runs(logs, 900.0)
+    assert some == [(k, slice(0, 16_666)) for k in (0, 1, 2, 4)]
+    # a filter that keeps them all
+    assert systematic_sample.placed_runs(logs, 2000.0) == systematic_sample.placed_runs(logs)

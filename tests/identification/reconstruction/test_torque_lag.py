@@ -14,7 +14,7 @@ from scipy.signal import bilinear, lfilter
 from synthetic import COULOMB, VISCOUS, fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
-from armloop.data.signals import Conditioning, preprocess
+from armloop.data.signals import FELT, Conditioning, preprocess
 from armloop.diagnosis import diagnose
 from armloop.identification.reconstruction import Reconstruction, reconstruct
 from armloop.identification.reconstruction import torque_lag as torque_lags
@@ -79,6 +79,39 @@ def test_a_lag_is_the_same_at_all_frequencies(
 
     monkeypatch.setattr("armloop.identification.reconstruction.torque_lag._found", own)
     assert found(DEAD).seconds == (DEAD if taken else 0.0)
+
+
+@pytest.mark.parametrize("dead", [-0.002, 0.002])
+def test_a_late_speed_makes_no_lag_of_the_torque_below_half_the_corner(dead: float) -> None:
+    """The speed's 2.2 ms are felt below 8.5 Hz, and just not below half of that."""
+    late = []
+    for seed in (1, 2):
+        log = recorded(seed, dead)
+        v = np.column_stack([np.interp(log.time - 0.0022, log.time, x) for x in log.v.T])
+        late.append(replace(log, v=v))
+    assert late[0].velocity_lag == pytest.approx(0.0022, abs=1e-4)
+    assert 4.25 * late[0].velocity_lag < FELT < 8.5 * late[0].velocity_lag
+    intervals = [np.zeros((0, 2))] * 2
+    for corner in (8.5, 4.25):
+        own = torque_lags._found(late, three_axis(), Conditioning(corner), intervals, 2.0, 8.5)
+        assert own.seconds == pytest.approx(dead, abs=3e-4)
+
+
+def test_of_fast_logs_as_much_motion_is_looked_at_as_of_slow_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of samples that the filter takes out anyway, a log at 1 kHz has more, and tells no more."""
+    seen: list[float] = []
+
+    def own(logs: Any, *_: Any) -> TorqueLag:
+        seen.append(sum(float(np.ptp(log.time)) for log in logs))
+        return TorqueLag(0.0, 1.0, np.zeros(3))
+
+    monkeypatch.setattr(torque_lags, "_found", own)
+    for rate in (250.0, 1000.0):
+        time = np.arange(0, 100, 1 / rate)
+        x = np.zeros((len(time), 3))
+        logs = [MotionLog(time, x, x, x)] * 2
+        torque_lag(logs, three_axis(), Conditioning(8.5), [np.zeros((0, 2))] * 2, 2.0)
+    assert seen == pytest.approx([200.0, 200.0], rel=1e-3)
 
 
 def test_held_out_blocks_take_no_part() -> None:

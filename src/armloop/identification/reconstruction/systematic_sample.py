@@ -17,10 +17,10 @@ from armloop.data.pieces import LogSource
 _SAMPLES = 60_000
 
 
-def selected(logs: Sequence[LogSource]) -> list[int]:
+def selected(logs: Sequence[LogSource], most: float | None = None) -> list[int]:
     """Some of the logs, evenly, that hold about so many samples as are looked at."""
     total = sum(log.samples for log in logs)
-    count = max(1, min(len(logs), int(np.ceil(len(logs) * _SAMPLES / max(total, 1)))))
+    count = max(1, min(len(logs), int(np.ceil(len(logs) * (most or _SAMPLES) / max(total, 1)))))
     return [int(k) for k in np.linspace(0, len(logs) - 1, count)]
 
 
@@ -29,14 +29,19 @@ def even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
     return [run for _, run in placed_runs(logs)]
 
 
-def placed_runs(logs: Sequence[LogSource]) -> list[tuple[int, MotionLog]]:
+def placed_runs(logs: Sequence[LogSource], thinned_hz: float = np.inf) -> list[tuple[int, MotionLog]]:
     """The place of its log, and a run of it: of some logs, and of the lengths of their runs, evenly.
 
     A log may hold as many recordings, of motion as different, as many logs do: its longest run alone may not tell links
     apart.
+
+    Args:
+        thinned_hz: rate to which a filter thins them afterwards; samples beyond it are no further ones.
     """
-    picked, found = selected(logs), []
-    most = _SAMPLES // len(picked)
+    rate = 0.0 if np.isinf(thinned_hz) else 1 / logs[0].read().period
+    whole = _SAMPLES * max(1.0, rate / thinned_hz)
+    picked, found = selected(logs, whole), []
+    most = int(whole / len(picked))
     for k in picked:
         log = logs[k].read()
         runs = sorted(log.runs(), key=lambda run: run.start - run.stop)

@@ -116,18 +116,25 @@ def torque_lag(
         aside: per log, (B, 2) intervals that take no part.
         block_seconds: length of pieces whose errors are independent.
     """
-    placed = placed_runs(logs)
+    placed = placed_runs(logs, how.oversampling * how.cutoff_hz)
     some, left_out = [run for _, run in placed], [aside[k] for k, _ in placed]
-    found = _found(some, arm, how, left_out, block_seconds)
+    found = _found(some, arm, how, left_out, block_seconds, how.cutoff_hz)
     if abs(found.seconds) * how.cutoff_hz < FELT or not found.clear:
         return replace(found, seconds=0.0)
-    slow = _found(some, arm, replace(how, cutoff_hz=how.cutoff_hz / _SLOWER), left_out, block_seconds)
+    slower = replace(how, cutoff_hz=how.cutoff_hz / _SLOWER)
+    # where v is late, it is as late below half the corner: the torque's own lag alone may differ
+    slow = _found(some, arm, slower, left_out, block_seconds, how.cutoff_hz)
     allowed = max(_SURE * float(np.hypot(found.std_error, slow.std_error)), _ALIKE * abs(found.seconds))
     return found if abs(found.seconds - slow.seconds) <= allowed else replace(found, seconds=0.0)
 
 
 def _found(
-    logs: Sequence[MotionLog], arm: Arm, how: Conditioning, aside: Sequence[Array], block_seconds: float
+    logs: Sequence[MotionLog],
+    arm: Arm,
+    how: Conditioning,
+    aside: Sequence[Array],
+    block_seconds: float,
+    felt_hz: float,
 ) -> TorqueLag:
     """The lag below one corner; a standard error without bound where too little moves."""
     base = BaseParameters.of_arm(arm, rotors=True)
@@ -135,7 +142,7 @@ def _found(
     parts, following = [], 0
     for log, intervals in zip(logs, aside, strict=True):
         try:
-            samples = preprocess([log], how)
+            samples = preprocess([log], how, felt_hz=felt_hz)
         except ShortRunError:
             continue
         speed = np.abs(samples.motion.v)
