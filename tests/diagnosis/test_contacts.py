@@ -90,6 +90,10 @@ def test_an_event_of_no_more_than_what_nothing_accounts_for_at_other_times_is_dr
     left[:110], left[120:] = 4.4, 4.4
     left[110] = 3.0
     assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    # as much of it, but the joint dwells in between: as many samples that count are as long
+    left[105:130] = 2 * np.sqrt(10.1)
+    rows[105:130:2] = False
+    assert is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
     left[110:120], left[95:105] = 4.4, 2 * np.sqrt(10.1)
     assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
 

@@ -410,6 +410,7 @@ def told(whole: Evidence, evidence: Evidence, contact: Contact, laws: Sequence[E
 def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joints: Sequence[int]) -> bool:
     """Whether an event removes no more than is left, outside of all events, of some stretch of its run that is as long.
 
+    As long in samples that count: where the joint rests nothing is left to see, in a program with dwells of any stretch.
     Each joint counts by its part of what the event removes, as for effects that an unknown rest outweighs.
 
     Args:
@@ -429,7 +430,8 @@ def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joi
         if left[:, j].sum() < MULTIPLE**2 * rows[:, j].sum():
             continue
         for run in motion.runs():
-            sums = np.cumsum(np.append(0.0, left[_within(kept, run), j]))
+            within = _within(kept, run)
+            sums = np.cumsum(np.append(0.0, left[within, j][rows[kept, j][within]]))
             most = float((sums[length:] - sums[:-length]).max(initial=0.0)) / length
             rest[j] = max(rest[j], most - 1.0)
     return bool(removed @ (removed - rest) < 0)
