@@ -60,6 +60,26 @@ class TestTwoBetweenWhichNothingTells:
         assert self.between([(3.2, 0)], (3.1, 5.0)) is not None
         assert self.between([], (16.0, 17.0)) is None
 
+    def test_may_be_one_if_a_joint_of_theirs_leaves_more_than_its_baseline_all_the_while(self) -> None:
+        tells, residual = np.ones((200, 2), dtype=bool), np.zeros((200, 2))
+        events = self.found(2.0, 3.0, 0), self.found(4.0, 5.0, 1)
+
+        def both() -> Burst | None:
+            quiet = contacts._quiet(self.evidence(), residual, tells, frozenset({0, 1}))
+            return contacts._with_what_is_between(self.evidence(), quiet, *events)
+
+        assert both() is None
+        # baselines are 1 and 2; now one of them shows it, now the other
+        residual[20:36, 0], residual[35:51, 1] = -2.1, 4.1
+        assert both() is not None
+        residual[35:51, 1] = 3.9
+        assert both() is None
+        # what no sample tells of, nor another joint's, is not theirs
+        residual[35:51, 1], tells[35:51, 1] = 9.0, False
+        assert both() is None
+        alone = contacts._quiet(self.evidence(), residual, tells, frozenset({1}))
+        np.testing.assert_array_equal(alone, tells)
+
     def test_are_one_if_that_explains_both_but_for_what_freedom_explains(self) -> None:
         """Energies of 4 over two seconds, with a share of 0.9, and of 1 over one second, with a share of 0.6."""
         first = self.found(2.0, 4.0, 0, before=np.array([2.0, 0.0]), share=0.9)

@@ -100,7 +100,11 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
         contacts += _one_or_each(evidence, left, burst, counted(burst, bursts), bursts)
     events: list[Contact] = []
     for contact in _distinct(motion, [c for c in contacts if _seen_whole(motion, c)]):
-        both = _with_what_is_between(evidence, tells | ~holds, events[-1], contact) if events else None
+        both = None
+        if events:
+            joints = events[-1].shown | contact.shown
+            quiet = _quiet(evidence, residual, tells | ~holds, joints)
+            both = _with_what_is_between(evidence, quiet, events[-1], contact)
         if both and _rare(evidence.rows, [both]):
             beyond = [b for b in bursts if not b.joints <= both.joints]
             one = push(evidence, residual, both.rows, counted(both, beyond), sorted(both.joints))
@@ -145,8 +149,18 @@ def _one_or_each(
     return each
 
 
+def _quiet(evidence: Evidence, residual: Array, tells: Mask, joints: frozenset[int]) -> Mask:
+    """(N, n) samples that tell of no event: none of these joints leaves more than twice its baseline.
+
+    An event that goes on may hardly show where the arm has little lever, or ceases to grow; but it does not cease to show.
+    """
+    own = sorted(joints)
+    loud = (np.abs(residual[:, own]) > MULTIPLE * evidence.scale[own]) & tells[:, own]
+    return np.asarray(tells & ~loud.any(axis=1, keepdims=True))
+
+
 def _with_what_is_between(evidence: Evidence, tells: Mask, first: Contact, then: Contact) -> Burst | None:
-    """Two events of one run and what is between them, where no sample (N, n) of their joints may tell of either.
+    """Two events of one run and what is between them, where no sample (N, n) of their joints tells that neither is there.
 
     One event may show with one sign first and then the other, and be seen as two, as the arm turns in it.
     """
