@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import codecs
+import errno
 import io
 import os
 import signal
@@ -43,6 +44,8 @@ COMMANDS = (
 )
 
 
+#: A file that was opened and cannot hold more: the disk, or what its owner may use of it.
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 NO_MEMORY = "not enough memory for this; give shorter logs, fewer terms or a lower order"
 
 
@@ -136,7 +139,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except OSError as error:
         place = f"{error.filename}: " if error.filename is not None else ""
-        return _fault(f"{place}{error.strerror or error}; check that it is there and may be used", 2)
+        mend = (
+            "make room, or write elsewhere"
+            if error.errno in _FULL
+            else "check that it is there and may be used"
+        )
+        return _fault(f"{place}{error.strerror or error}; {mend}", 2)
     except MemoryError:
         return _fault(NO_MEMORY, 1)
     except RuntimeError as error:

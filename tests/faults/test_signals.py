@@ -1,5 +1,6 @@
 """Signals, a full disk and no memory: one line, nothing half-written, no worker that lives on."""
 
+import errno
 import os
 import resource
 import signal
@@ -92,6 +93,19 @@ def test_a_signal_ends_workers_too_with_one_line(sent: int, status: int, said: s
     with replacing(place / "half.csv") as draft:
         draft.write_text("2")
     assert not [path for path in contents(place) if path.endswith(".part")]
+
+
+def test_an_answer_for_which_there_is_no_room_is_said_so(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is written to the standard output alone has no name."""
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("armloop.commands.evaluate.run", full)
+    assert main(["evaluate", "model.json", "run.csv"]) == 2
+    assert capsys.readouterr().err == "armloop: No space left on device; make room, or write elsewhere\n"
 
 
 def test_a_full_disk_is_one_line_and_leaves_nothing(

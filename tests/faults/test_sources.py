@@ -1,5 +1,6 @@
 """What `armloop convert` is given by other programs: broken, empty, endless, or not what its name says."""
 
+import gzip
 import json
 import os
 import zipfile
@@ -106,6 +107,16 @@ SOURCES: dict[str, tuple[Lay, str, str]] = {
         parquet(**{name: pyarrow.array([], pyarrow.float64()) for name in NAMES}),
         f"bad.parquet{SAID}",
         "0 rows",
+    ),
+    "a source that is packed": (
+        lambda place: (place / "bad.csv.gz").write_bytes(gzip.compress(b"time,q1\n")),
+        "bad.csv.gz",
+        r"bad\.csv\.gz: is compressed by gzip, not a text; unpack it first$",
+    ),
+    "a bag that was taken from its folder's description": (
+        lambda place: ((place / "bad").mkdir(), (place / "bad" / "one.db3").touch()),
+        "bad",
+        r"bad: a folder with neither metadata\.yaml .*; give \S*one\.db3 itself$",
     ),
     "an empty MATLAB file": (lambda place: (place / "bad.mat").touch(), "bad.mat", "no MATLAB file"),
     "an archive that claims 8 TB": (claiming, "bad.npz", "more than there is memory for"),

@@ -14,7 +14,7 @@ from armloop.convert.rosbag import read_rosbag
 from armloop.convert.rtde import is_rtde, read_rtde
 from armloop.convert.table import read_table
 from armloop.convert.text import header_of
-from armloop.data.tables import check_name
+from armloop.data.tables import check_name, other_kind
 from armloop.util.errors import LogError
 
 KNOWN = (
@@ -41,8 +41,10 @@ def read_source(path: Path, topic: str | None = None, wanted: Sequence[str] | No
             if is_lerobot(path):
                 return read_lerobot(path)
             if path.is_dir():
+                bags = sorted(path.glob("*.db3")) + sorted(path.glob("*.mcap"))
+                alone = f"; give {bags[0]} itself" if bags else ""
                 raise LogError(
-                    f"{path}: a folder with neither metadata.yaml (a ROS 2 bag) nor meta/info.json (LeRobot)"
+                    f"{path}: a folder with neither metadata.yaml (a ROS 2 bag) nor meta/info.json (LeRobot){alone}"
                 )
             return read_table(path)
         if suffix == ".mat":
@@ -54,6 +56,8 @@ def read_source(path: Path, topic: str | None = None, wanted: Sequence[str] | No
             if is_rtde(header):
                 return read_rtde(path)
             return read_libfranka(path) if is_libfranka(header) else read_table(path)
+        if kind := other_kind(path):
+            raise LogError(f"{path}: {kind}")
     except OSError as error:
         raise LogError(
             f"{path}: cannot be read ({error.strerror or error}); check its permissions"
