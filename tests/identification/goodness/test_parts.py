@@ -123,6 +123,20 @@ def test_a_missing_ripple_is_predictable(order: int) -> None:
     assert not found[0].much_is_left and not found[2].much_is_left
 
 
+def test_friction_that_depends_on_the_place_is_predictable() -> None:
+    """A tight spot of joint 2, a quarter of its travel wide, beside dry friction that was taken for it."""
+    given = samples(20.0)
+    q, v = given.motion.q[:, 1], given.motion.v[:, 1]
+    spot = np.exp(-(((q - q.mean()) / (0.12 * np.ptp(q))) ** 2))
+    law = (spot - spot.mean()) * np.sign(v)
+    residual = 0.1 * white(given, 3)
+    residual[:, 1] += 0.3 * law / np.sqrt(np.mean(law**2))
+    found = parts(residual, given)
+    check_sums(found)
+    assert found[1].predictable_left == pytest.approx(0.09, rel=0.2)
+    assert not found[0].much_is_left and not found[2].much_is_left
+
+
 def test_what_was_fitted_helps_and_does_not_judge() -> None:
     """A residual that is small where the model was fitted says nothing there."""
     given = samples()

@@ -22,6 +22,8 @@ _PASTS = (0.05, 0.25)
 #: Half periods of the own angle's harmonics within its travel: cosines, which at its ends need not come back to where they
 #: began (Fourier's series of the even continuation), so that a wave of any order is a sum of few of them.
 _HALVES = 24
+#: Of these, so many times the own direction: friction that depends on the place, as where a bearing or a rail is worn.
+_RUBS = 12
 _TINY = 1e-9
 
 
@@ -47,8 +49,8 @@ def features(motion: Motion, joint: int, scales: Scales, load: Array | None = No
     """(N, p) columns that a residual of joint ``joint`` (0-based) may depend on.
 
     State: q, v, vdot of all joints, the powers of the own speed, harmonics of the own angle. Direction: that of every
-    joint and of the sums and differences of its speed with the others'. Recent path: travel since the last reversal,
-    presliding elements, and fading averages of the own speed.
+    joint, of the sums and differences of its speed with the others', and the own one by harmonics of the own angle.
+    Recent path: travel since the last reversal, presliding elements, and fading averages of the own speed.
 
     Args:
         load: (N, n) torque that passes the joints, by the model.
@@ -59,9 +61,11 @@ def features(motion: Motion, joint: int, scales: Scales, load: Array | None = No
     others = [k for k in range(motion.joints) if k != joint]
     columns = [q, v, vdot, np.sin(q[:, joint]), np.cos(q[:, joint])]
     turn = np.pi * (q[:, joint] - scales.low[joint]) / span[joint]
-    columns.append(np.cos(np.outer(turn, np.arange(1, _HALVES + 1))))
+    harmonics = np.cos(np.outer(turn, np.arange(1, _HALVES + 1)))
+    columns.append(harmonics)
     columns += [np.abs(speed) * speed, np.sqrt(np.abs(speed)) * np.sign(speed), speed**3]
     columns += [np.tanh(speed / fade) for fade in _FADES]
+    columns.append(harmonics[:, :_RUBS] * np.tanh(speed / _FADES[0])[:, None])
     columns += [np.tanh(v[:, k] / (_FADES[0] * fastest[k])) for k in others]
     for k in others:
         for w in (own + v[:, k], own - v[:, k]):
