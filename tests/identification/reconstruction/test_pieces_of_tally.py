@@ -110,6 +110,18 @@ def test_a_baseline_is_of_motion_as_fast_as_the_model_knows(monkeypatch: pytest.
     np.testing.assert_allclose(whole.sliding[0], whole.sums[0][1])
 
 
+def test_a_baseline_is_of_no_sample_near_an_end_of_its_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A log that ends in a hard stop leaves there what no run is judged by; the printed errors are of all motion."""
+    left = LEFT.copy()
+    left[[0, -1]] = 1e3
+    monkeypatch.setattr(tally, "residual", lambda model, samples: left)
+    assert MOVING[[0, -1]].all()
+    whole = Tally.fitted(chunk(1.0), NOBODY, None, 8.0)
+    rmse = np.sqrt(np.mean(LEFT[1:-1] ** 2, axis=0, where=MOVING[1:-1]))
+    np.testing.assert_allclose(whole.baseline()["rmse"], rmse)
+    assert min(whole.score().moving["rmse"]) > 100
+
+
 def test_blocks_told_apart_in_pieces_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
     model = NOBODY
@@ -120,7 +132,7 @@ def test_blocks_told_apart_in_pieces_of_their_own(monkeypatch: pytest.MonkeyPatc
     # pieces do not go on from one held-out block into another
     assert len(Tally.of(chunk(1.0), model, None, seconds=1e3).blocks) == 2
     every = Tally.fitted(chunk(1.0), model, None, 8.0)
-    assert every.samples == N and every.blocks[:, 1].sum() == MOVING.sum()
+    assert every.samples == N and every.blocks[:, 1].sum() == MOVING[1:-1].sum()
     none = Tally.of(chunk(1.0, np.zeros(N, dtype=bool)), model, None)
     assert (none.samples, none.sums, none.blocks.shape) == (0, {}, (0, 2, 2))
 

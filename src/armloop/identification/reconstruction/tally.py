@@ -48,7 +48,8 @@ class Tally:
             samples are no time series.
         samples: number of held-out samples.
         sliding: per working condition, (3, n): the same as ``sums`` of moving samples in which a joint is not slower than
-            it slid where the model was fitted. What friction is there the model cannot know, nor is a run judged by it.
+            it slid where the model was fitted, nor near an end of its run. What friction is there the model cannot know, nor
+            what a stop that ends a log asks of the drives; nor is a run judged by it.
         places: (2, n) of samples where a joint turns round (``reversals``, :mod:`armloop.data.reversals`), and where it
             creeps (``creeping``, :mod:`armloop.data.creep`): the squared errors, and their number; zeros where samples are
             no time series.
@@ -84,7 +85,7 @@ class Tally:
         samples, held = chunk.samples, chunk.judging(part, margin)
         every = residual(model, samples) ** 2
         squares, moving = every[held], samples.moving[held]
-        slid = moving & ~too_slow(model, samples)[held]
+        slid = moving & ~(too_slow(model, samples) | samples.at_an_end[:, None])[held]
         labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples)
         sums, sliding = {}, {}
         for label in np.unique(labels[held]):
