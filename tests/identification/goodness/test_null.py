@@ -179,6 +179,17 @@ def test_a_stretch_is_a_run_with_the_filters_reach_on_either_side_and_thinned() 
         assert cut.motion.elapsed[run] == pytest.approx(cut.motion.time[run] - time[0], abs=0.5)
 
 
+def test_a_law_that_has_all_but_vanished_removes_nothing() -> None:
+    """Two columns of a friction that falls far below the speeds of a stretch, whose squares are no numbers any more."""
+    rng = np.random.default_rng(1)
+    y, counted = rng.normal(size=(50, 1)), np.ones((50, 1), dtype=bool)
+    column = rng.uniform(0.5, 1.0, size=(50, 1, 1, 1))
+    vanished = column * np.array([1e-204, 2e-196])
+    there = rng.normal(size=(50, 1, 1, 2))
+    removed = null._removed(np.concatenate([vanished, there], axis=2), y, counted)
+    assert removed[0] == 0.0 and removed[1] > 0.0
+
+
 def test_columns_are_fitted_to_all_joints_at_once() -> None:
     y, counted = (
         np.array([[1.0, 3.0], [1.0, 3.0], [9.0, 9.0]]),

@@ -120,7 +120,9 @@ def _removed(X: Array, y: Array, counted: Mask) -> Array:
     """(S, n) mean square that the columns of each of S shapes, X (N, n, S, p), remove of each joint of y (N, n), fitted to
     all counted samples at once."""
     A, b = X[counted].transpose(1, 0, 2), y[counted]
-    A = A / np.maximum(np.linalg.norm(A, axis=1, keepdims=True), TINY)
+    size = np.linalg.norm(A, axis=1, keepdims=True)
+    # of a law that has all but vanished at these speeds the squares are rounded to nothing, and so is it
+    A = np.where(size > np.sqrt(TINY), A / np.maximum(size, np.sqrt(TINY)), 0.0)
     At = A.transpose(0, 2, 1)
     fitted = np.linalg.solve(At @ A + RIDGE * np.eye(A.shape[2]), (At @ b)[:, :, None])
     after = np.zeros((len(A), *y.shape))
