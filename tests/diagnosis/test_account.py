@@ -41,6 +41,42 @@ def test_the_part_of_bursts_that_effects_and_law_explain() -> None:
     assert outcome.after.held_out.tolist() == [1, 2, 3, 4, 5, 6, 7]
 
 
+def test_effects_foretell_events_of_which_they_predict_most_by_the_rest_of_the_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of a residual of 4 N·m the effects leave 2 in the first event and 3 in the second: three quarters and 7/16 of it."""
+    fitted: list[Any] = []
+
+    def fit(evidence: Any, residual: Any, effects: Any, shapes: Any) -> Any:
+        fitted.append((evidence, residual, effects, shapes))
+        return SimpleNamespace(added=lambda: ["as outside"])
+
+    monkeypatch.setattr(accounts, "fit", fit)
+    left = np.array([[9.0, 9.0], [2.0, 9.0], [3.0, 9.0]])
+    whole: Any = SimpleNamespace(
+        rows=np.array([[True, True], [True, False], [True, False]]),
+        scale=np.array([0.5, 1.0]),
+        model=SimpleNamespace(with_effects=lambda added: added),
+        left_by=lambda model: left if model == ["as outside"] else None,
+    )
+    after = SimpleNamespace(effects=("spring",), shapes=("soft",))
+    outside: Any = SimpleNamespace(residual=lambda known: f"beside {known}")
+
+    def event(sample: int, share: float) -> Any:
+        return SimpleNamespace(rows=np.arange(3) == sample, share=share)
+
+    def foretold(*events: Any) -> bool:
+        outcome: Any = SimpleNamespace(after=after)
+        return Account(whole, [], outside, outcome, None).foretells(outside, [*events], np.full((3, 2), 4.0))
+
+    assert foretold(event(1, 1.0), event(2, 0.874))
+    assert fitted == [(outside, "beside []", ("spring",), ("soft",))]
+    assert not foretold(event(1, 1.0), event(2, 0.876))
+    assert not foretold(event(2, 0.876), event(1, 1.0))
+    after.effects = ()
+    assert not foretold(event(1, 1.0))
+
+
 def test_a_joint_that_rested_so_long_ago_is_recorded_at_rest() -> None:
     """Two runs, ten samples a second, torques recorded 0.15 s late."""
     time = np.concatenate([np.arange(10) * 0.1, 50 + np.arange(10) * 0.1])

@@ -68,10 +68,11 @@ def accounted(
     monkeypatch: pytest.MonkeyPatch,
     of_event: float = 0.7,
     law: Any = None,
+    foretold: bool = False,
 ) -> accounts.Account:
     """The account of a run of 1000 of which effects leave so much without an event, and 100 beside what each look shows.
 
-    Without it they explain the part ``of_event`` of what it did.
+    Without it they explain the part ``of_event`` of what it did; by what they do at other times it is foretold or not.
     """
 
     def of(whole: Any, contacts: list[Any], *rest: object) -> accounts.Account:
@@ -90,6 +91,11 @@ def accounted(
     first, again = looks
     monkeypatch.setattr(accounts.Account, "of", staticmethod(of))
     monkeypatch.setattr(accounts.Account, "explains", lambda self, contacts, residual: of_event)
+    monkeypatch.setattr(
+        accounts.Account,
+        "foretells",
+        lambda self, evidence, contacts, residual: foretold and not self.contacts and bool(contacts),
+    )
     monkeypatch.setattr(
         accounts.Account, "left", lambda self, residual: 100.0 if self.contacts else by_effects
     )
@@ -136,6 +142,16 @@ def test_an_event_gives_way_if_four_fifths_of_it_or_its_own_share_are_explained(
 ) -> None:
     event = SimpleNamespace(share=share)
     assert len(accounted(150.0, [event, event], monkeypatch, of_event=part).contacts) == kept
+
+
+@pytest.mark.parametrize(("by_effects", "kept"), [(150.0, 0), (324.0, 0), (326.0, 1)])
+def test_an_event_gives_way_to_effects_that_foretell_it(
+    by_effects: float, kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Effects that explain the rest of the run as well, and less of the event than it does itself."""
+    event = SimpleNamespace(share=0.9)
+    told = accounted(by_effects, [event, event], monkeypatch, of_event=0.5, foretold=True)
+    assert len(told.contacts) == kept
 
 
 def test_an_event_is_what_it_looks_like_without_the_effects(monkeypatch: pytest.MonkeyPatch) -> None:

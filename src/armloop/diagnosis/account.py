@@ -163,6 +163,27 @@ class Account:
         after = held_out[bursts[evidence.stacking[0]]]
         return 1 - float((after**2).sum()) / max(float((before**2).sum()), TINY)
 
+    def foretells(self, evidence: Evidence, contacts: list[Contact], residual: Array) -> bool:
+        """Whether effects predict, fitted to a run without these events, most of what each of them explains there.
+
+        A push has nothing to do with what the run is like before and after it; a law that shows most at times has.
+
+        Args:
+            evidence: the run without the events.
+            residual: (N, n) what the events explain a part of, N·m (N).
+        """
+        after, whole = self.outcome.after, self.whole
+        if not after.effects:
+            return False
+        outside = fit(evidence, evidence.residual([]), after.effects, after.shapes)
+        left = whole.left_by(whole.model.with_effects(outside.added()))
+        for contact in contacts:
+            mine = whole.rows & contact.rows[:, None]
+            before, now = (float(((x / whole.scale)[mine] ** 2).sum()) for x in (residual, left))
+            if before - now < MOSTLY * contact.share * before:
+                return False
+        return True
+
 
 def laws_instead(
     whole: Evidence, contacts: list[Contact], panel: Hypotheses, progress: Progress
@@ -248,7 +269,10 @@ def best_account(
         *(each.left(residual) for each in (plain, account)),
     )
     alike = bare - plain_left >= MOST * (bare - left)
-    explained = alike and plain.explains(account.contacts, residual) >= enough
+    explained = alike and (
+        plain.explains(account.contacts, residual) >= enough
+        or plain.foretells(account.evidence, account.contacts, residual)
+    )
     if same or explained or plain_left <= left:
         progress("what looked like contacts is explained without them")
         return plain
