@@ -201,6 +201,9 @@ def test_small_arms_are_read_in_every_order_of_the_same_kinds_and_larger_ones_in
         and [4, 0, 1, 2, 3] in five
         and [3, 1, 2, 0, 4] in five
     )
+    assert len(orders("R" * 10)) == 45 + 3
+    many = orders("R" * 11)
+    assert len(many) == 10 + 3 and [1, 0, *range(2, 11)] in many and [2, 1, 0, *range(3, 11)] not in many
     assert orders("RRPRR") == [[1, 0, 2, 3, 4], [3, 1, 2, 0, 4], [4, 1, 2, 3, 0], [0, 3, 2, 1, 4], [0, 4, 2, 3, 1],
                                [0, 1, 2, 4, 3], [4, 3, 2, 1, 0]]  # fmt: skip
 
@@ -334,7 +337,9 @@ def test_an_arm_that_hangs_may_be_its_mirror_image(monkeypatch: pytest.MonkeyPat
     assert "joint 1 counts from another zero" in said and "; or" not in said
 
 
-@pytest.mark.parametrize(("joints", "sets"), [(2, 3), (6, 63), (7, 127), (8, 8 + 28)])
+@pytest.mark.parametrize(
+    ("joints", "sets"), [(2, 3), (6, 63), (7, 127), (8, 8 + 28), (10, 10 + 45), (11, 11)]
+)
 def test_small_arms_are_read_with_every_set_of_joints_turned(joints: int, sets: int) -> None:
     found = [reading.turned for reading in readings(arm_of("R" * joints)) if reading.turned]
     assert len(set(found)) == len(found) == sets

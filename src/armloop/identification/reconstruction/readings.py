@@ -45,6 +45,8 @@ _SENSE = (2.0, 1.2, 0.8)
 _EVERY_SENSE = 7
 #: Arms of so many joints are tried in every order; larger ones with any two in exchange, turned round and moved on by one.
 _EVERY_ORDER = 4
+#: … but of arms of more joints than these neighbours alone, and one that counts the other way: of pairs there are too many.
+_EVERY_PAIR = 10
 #: Units of an angle that are not the radian, in rad.
 _ANGLES = {"revolutions": 2 * np.pi, "degrees": np.pi / 180}
 
@@ -143,7 +145,7 @@ def readings(arm: Arm) -> Iterator[Reading]:
         if order != tuple(range(arm.n)) and (arm.revolute[list(order)] == arm.revolute).all():
             yield Reading(np.array(order, dtype=np.intp))
     for size in range(1, arm.n + 1):
-        if size <= 2 or arm.n <= _EVERY_SENSE:
+        if size <= (2 if arm.n <= _EVERY_PAIR else 1) or arm.n <= _EVERY_SENSE:
             yield from (Reading(as_given, turned=some) for some in combinations(range(arm.n), size))
 
 
@@ -152,7 +154,8 @@ def _orders(n: int) -> Iterator[tuple[int, ...]]:
         yield from permutations(range(n))
         return
     for i, j in combinations(range(n), 2):
-        yield tuple({i: j, j: i}.get(k, k) for k in range(n))
+        if n <= _EVERY_PAIR or j == i + 1:
+            yield tuple({i: j, j: i}.get(k, k) for k in range(n))
     yield tuple(reversed(range(n)))
     for step in (1, -1):
         yield tuple((k + step) % n for k in range(n))
