@@ -65,7 +65,7 @@ class Answers:
             "misrecorded": lambda *_: "",
             "settled": lambda model, logs: (logs, np.full((1, 3), 0.1)),
             "sentences": lambda model, names, zeros: [f"zeros of {names}"],
-            "conditioned": lambda model, logs: samples,
+            "preprocess": lambda logs, how: samples,
             "hypotheses": lambda arm: ["one", "two"],
             "find_contacts": lambda evidence, residual: self.note(
                 "contacts", residual, self.given["contacts"]

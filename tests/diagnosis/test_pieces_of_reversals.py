@@ -268,7 +268,7 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
             samples=samples,
             rows=rows,
             scale=scale,
-            model=SimpleNamespace(arm=None, baseline={}, friction=FrictionLaw(((), ()))),
+            model=SimpleNamespace(arm=None, baseline={}, friction=FrictionLaw(((), ())), history={}),
             only=lambda own: run(own),
         )
 
@@ -330,7 +330,7 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
     samples = SimpleNamespace(motion=motion, moving=None, period=0.05)
     baseline: dict[str, Any] = {}
     evidence: Any = SimpleNamespace(
-        model=SimpleNamespace(baseline=baseline, friction=FrictionLaw(((), ()))),
+        model=SimpleNamespace(baseline=baseline, friction=FrictionLaw(((), ())), history={}),
         samples=samples,
         rows=rows,
         only=lambda own: SimpleNamespace(rows=own, samples=samples),
@@ -363,6 +363,26 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
         evidence.model.friction = FrictionLaw((memory, law))
         assert judge_reversals(evidence, outcome, kept, lambda text: None) is None
         assert set(np.argwhere(asked[-1][1])[:, 1].tolist()) == joints
+
+
+def test_what_rested_by_the_dead_zones_of_training_does_not_turn_round() -> None:
+    """Joint 1 turns round at 2, 6 and 10 s, joint 2 as often and ten times as slowly."""
+    time = np.arange(0, 12, 0.01)
+    v = np.cos(np.pi / 4 * time)[:, None] * np.array([1.0, 0.1])
+    slow = np.abs(v) < 0.002
+    samples = Samples(Motion(time, v, v, v, np.array([0])), 0 * v, ~slow, 0.01, 10.0)
+
+    def turned(**history: list[float]) -> list[int]:
+        model = SimpleNamespace(history=history, conditioning=SimpleNamespace(dead_zone=4.0, smear=0.5))
+        evidence: Any = SimpleNamespace(samples=samples, model=model)
+        return reversals.passing(reversals._as_in_training(evidence)).sum(axis=0).tolist()
+
+    quick = turned()
+    assert min(quick) > 0
+    # 0.008 rad/s either way: of joint 2 that takes longer than turning round may
+    wide = turned(velocity_noise=[0.002, 0.002])
+    assert wide[0] > quick[0] and wide[1] == 0
+    assert turned(velocity_noise=[0.002, 1e-6])[1] > 0
 
 
 class TestNamed:

@@ -1,16 +1,12 @@
 """Scores are RMSE and nRMSE per joint, with standstill apart from motion."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from synthetic import three_axis
 
 from armloop.data.filters import LowPass
-from armloop.data.log import MotionLog
 from armloop.data.motion import Motion, Samples
-from armloop.data.signals import preprocess
-from armloop.identification.scoring import conditioned, residual, score, score_errors
+from armloop.identification.scoring import residual, score, score_errors
 from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
 from armloop.model.components import SparseTerms
@@ -82,23 +78,3 @@ def test_the_prediction_passes_the_filter_of_the_measurement():
     smeared = LowPass(5.0, 0.02)(q)
     samples = Samples(motion, smeared, np.ones_like(q, dtype=bool), 0.02, 5.0)
     np.testing.assert_allclose(residual(model, samples), 0.0, atol=1e-12)
-
-
-def test_what_was_too_slow_to_count_in_noisy_training_logs_is_no_motion_in_a_quiet_one():
-    time = np.arange(0, 20, 0.004)
-    speeds = np.array([0.1, 0.02, 0.02])
-    q, v = speeds / 0.3 * np.sin(0.3 * time)[:, None], speeds * np.cos(0.3 * time)[:, None]
-    log, model = MotionLog(time, q, v, np.ones_like(q)), constant_model()
-    quiet = conditioned(model, [log])
-    np.testing.assert_array_equal(quiet.moving, preprocess([log], model.conditioning).moving)
-    assert (quiet.moving.mean(axis=0) > 0.9).all()
-    noise = [0.006, 0.006, 1e-9]  # four times that is between the first two speeds
-    noisy = conditioned(replace(model, history={"velocity_noise": noise}), [log])
-    assert 0.7 < noisy.moving[:, 0].mean() < 0.9 and not noisy.moving[:, 1].any()
-    np.testing.assert_array_equal(noisy.moving[:, 2], quiet.moving[:, 2])
-    np.testing.assert_allclose(noisy.velocity_noise[:2], noise[:2])
-    # samples that are no time series have no dead zone
-    bare = replace(
-        model, conditioning=replace(model.conditioning, cutoff_hz=0.0), history={"velocity_noise": noise}
-    )
-    assert conditioned(bare, [replace(log, vdot=0 * q)]).moving.all()

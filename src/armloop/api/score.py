@@ -13,8 +13,9 @@ from armloop.api.reading import as_logs, require_model, require_some
 from armloop.api.shown import displayed, page
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
+from armloop.data.signals import preprocess
 from armloop.identification.scoring import Score as Numbers
-from armloop.identification.scoring import conditioned, score
+from armloop.identification.scoring import score
 from armloop.model import ReconstructedModel
 from armloop.reports.tables import score_table
 from armloop.robot.arm import Arm
@@ -107,4 +108,4 @@ def samples_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> Samples
     found = logs_for(model, logs)
     require_some(found)
     say_beyond_limits(model.arm, found)
-    return conditioned(model, found)
+    return preprocess(found, model.conditioning)

@@ -18,7 +18,8 @@ def run(options: Evaluate) -> None:
     """Score a model on logs."""
     from armloop.commands.shared import model_and_logs, print_json
     from armloop.data.repeats import require_different
-    from armloop.identification.scoring import conditioned, score
+    from armloop.data.signals import preprocess
+    from armloop.identification.scoring import score
     from armloop.reports.tables import score_table
     from armloop.robot.plausibility import say_beyond_limits
     from armloop.util.doubts import warn
@@ -30,7 +31,7 @@ def run(options: Evaluate) -> None:
 
     require_different(logs)
     say_beyond_limits(model.arm, logs)
-    samples = conditioned(model, logs)
+    samples = preprocess(logs, model.conditioning)
     if not samples.tau.any():
         raise InputError(
             f"{logs[0].name}: every tau is zero throughout; give a log that holds the joints' torques"

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from armloop.data.dropouts import later, repaired
 from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
@@ -106,10 +105,6 @@ class Speeds:
         fastest = np.quantile(np.abs(log.v), _FASTEST, axis=0)
         travels = np.ptp(log.q, axis=0) >= _TRAVELS
         return Speeds(velocity_noise(log, cutoff_hz), np.where(travels, fastest, np.inf))
-
-    def as_noisy_as(self, noise: ArrayLike) -> Speeds:
-        """The same, of logs that are no less noisy than (n,) others."""
-        return replace(self, noise=np.maximum(self.noise, noise))
 
     @staticmethod
     def of_all(logs: Sequence[MotionLog], cutoff_hz: float) -> Speeds:

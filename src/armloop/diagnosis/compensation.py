@@ -10,7 +10,8 @@ import numpy as np
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
-from armloop.identification.scoring import Score, conditioned, score
+from armloop.data.signals import preprocess
+from armloop.identification.scoring import Score, score
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Index
 from armloop.util.errors import InputError
@@ -125,7 +126,7 @@ def held_out_run(before: ReconstructedModel, after: ReconstructedModel, log: Mot
         raise InputError(
             f"{log.name}: {log.joints} joints, but the model's arm {before.arm.name} has {before.arm.n}"
         )
-    samples = conditioned(before, [log])
+    samples = preprocess([log], before.conditioning)
     old, new = (score(lasting(model), samples) for model in (before, after))
     return HeldOutRun(log.name, old, new)
 

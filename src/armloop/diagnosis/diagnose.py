@@ -11,6 +11,7 @@ import numpy as np
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.repeats import require_different
+from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
 from armloop.diagnosis.account import Account, best_account, laws_instead
 from armloop.diagnosis.carried import account_with_load
@@ -36,7 +37,6 @@ from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted, without_law
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.diagnosis.zeros import sentences, settled
-from armloop.identification.scoring import conditioned
 from armloop.identification.validation.misrecorded import misrecorded
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.base import entry
@@ -256,7 +256,7 @@ def diagnose(
     progress("conditioning the run like the model's training logs")
     logs, zeros = settled(model, logs)
     own_zeros = sentences(model, [log.name for log in logs], zeros)
-    samples = conditioned(model, logs)
+    samples = preprocess(logs, model.conditioning)
     wrong = misrecorded(model, samples)
     if wrong:
         raise InputError(f"{', '.join(log.name for log in logs)}: {wrong}")

@@ -24,7 +24,8 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import norm, t
 
-from armloop.data.blocks import block_sums
+from armloop.data.blocks import block_sums, widened
+from armloop.data.motion import Samples
 from armloop.data.reversals import at_reversals, passing
 from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
@@ -84,7 +85,7 @@ def judge_reversals(
         kept: (N, n) samples that may count: not those of contacts, nor of joints that nothing may be named on.
     """
     samples = evidence.samples
-    turns = passing(samples) & kept & independent_rows(samples)[:, None]
+    turns = passing(_as_in_training(evidence)) & kept & independent_rows(samples)[:, None]
     turns &= ~(_never_seen(evidence) | _remembering(evidence, outcome))
     own = evidence.only(evidence.rows | turns)
     judged = at_reversals(samples, turns, own.rows & kept)
@@ -116,6 +117,20 @@ def judge_reversals(
         return None
     before, left = (np.sqrt(view.mean_squares(fit)) * own.scale for fit in (start.fit, whole.after))
     return AtReversals(found, whole, own, before, left)
+
+
+def _as_in_training(evidence: Evidence) -> Samples:
+    """The run with dead zones no narrower than those of the training logs, which may have been noisier.
+
+    What turns round so slowly was at rest by those, and how the model errs there, nobody knows.
+    """
+    samples, noise = evidence.samples, evidence.model.history.get("velocity_noise")
+    if noise is None or samples.cutoff_hz <= 0:
+        return samples
+    how = evidence.model.conditioning
+    still = np.abs(samples.motion.v) <= how.dead_zone * np.asarray(noise)
+    smeared = widened(still, samples.motion, round(how.smear / (samples.cutoff_hz * samples.period)))
+    return replace(samples, moving=samples.moving & ~smeared)
 
 
 def _never_seen(evidence: Evidence) -> Mask:

@@ -14,10 +14,9 @@ import numpy as np
 
 from armloop.data.filters import INDEPENDENT
 from armloop.data.log import MotionLog
-from armloop.data.signals import ShortRunError
+from armloop.data.signals import ShortRunError, preprocess
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import SIGNIFICANCE
-from armloop.identification.scoring import conditioned
 from armloop.laws.effects import effect
 from armloop.model import ReconstructedModel
 from armloop.regression.embedded import ITERATIONS
@@ -60,7 +59,7 @@ def sentences(model: ReconstructedModel, logs: Sequence[str], zeros: Array) -> l
 def _zeros(model: ReconstructedModel, log: MotionLog, usual: Array) -> Array:
     """(n,) zeros of one log; zero for joints that have none of their own, or another altogether."""
     try:
-        samples = conditioned(model, [log])
+        samples = preprocess([log], model.conditioning)
     except ShortRunError:
         return np.zeros(model.arm.n)
     evidence = Evidence.of(model, samples, [])

@@ -14,9 +14,8 @@ import numpy as np
 
 from armloop.data.creep import held_speed
 from armloop.data.filters import INDEPENDENT
-from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
-from armloop.data.signals import Speeds, preprocess, smooth
+from armloop.data.signals import smooth
 from armloop.laws.effects import Context, Effect
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Mask
@@ -41,17 +40,6 @@ class Score:
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``armloop evaluate --json``."""
         return {**self.overall, "moving": self.moving, "standstill": self.standstill, "samples": self.samples}
-
-
-def conditioned(model: ReconstructedModel, logs: Sequence[MotionLog]) -> Samples:
-    """Logs prepared as the model's training logs were: what was too slow to count as motion in those is none here.
-
-    Else a log with less noise would be judged by motion, and turns, that were kept out of the baseline.
-    """
-    how, noise = model.conditioning, model.history.get("velocity_noise")
-    if noise is None or how.cutoff_hz <= 0:
-        return preprocess(logs, how)
-    return preprocess(logs, how, Speeds.of_all(logs, how.cutoff_hz).as_noisy_as(noise))
 
 
 def residual(model: ReconstructedModel, samples: Samples) -> Array:

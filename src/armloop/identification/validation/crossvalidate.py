@@ -10,9 +10,9 @@ import numpy as np
 
 from armloop.data.log import MotionLog
 from armloop.data.repeats import require_different
-from armloop.data.signals import Conditioning
+from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
-from armloop.identification.scoring import Score, conditioned, residual, score_errors
+from armloop.identification.scoring import Score, residual, score_errors
 from armloop.identification.validation.splits import Split, by_blocks, by_file, judging_rows, told_apart
 from armloop.model import ReconstructedModel, model_of
 from armloop.robot.arm import Arm
@@ -168,7 +168,7 @@ _Judged = tuple[Array, Array, Mask]
 def _judge(split: Split, logs: Sequence[MotionLog], model: ReconstructedModel) -> list[tuple[int, _Judged]]:
     found = []
     for k, blocks in split.left_out.items():
-        samples = conditioned(model, [logs[k]])
+        samples = preprocess([logs[k]], model.conditioning)
         # unfiltered samples are numbered; where they lie in the log is its time
         time = samples.motion.time if samples.cutoff_hz > 0 else logs[k].time
         rows = judging_rows(time, samples, blocks)
