@@ -163,7 +163,7 @@ class TestRipple:
     def residual(self, *waves: tuple[float, float], noise: float = 0.0, **of: Any) -> ripple.Residual:
         left = sum(size * np.sin(order * self.Q + 0.3) for order, size in waves)
         left = left + noise * np.random.default_rng(1).normal(size=len(self.Q))
-        return ripple.Residual(self.Q, left * of.get("window", 1.0), np.arange(4000) // 200)
+        return ripple.Residual(self.Q, left * of.get("window", 1.0), np.arange(4000) // 200, 0 * self.Q)
 
     def test_a_line_stands_out_with_its_phase_kept(self) -> None:
         orders = np.arange(20.0, 100.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -29,7 +30,8 @@ def residual(
     block = np.arange(100 * blocks) // 100
     wave = sine * np.sin(100 * q) + cosine * np.cos(100 * q)
     there = np.isin(block, of.get("there", range(blocks)))
-    return Residual(q, np.where(there, wave, 0.0) + noise * rng.normal(size=len(q)), block)
+    left = np.where(there, wave, 0.0) + noise * rng.normal(size=len(q))
+    return Residual(q, left, block, np.ones_like(q))
 
 
 def test_a_line_has_the_coefficients_and_the_errors_of_least_squares_over_blocks() -> None:
@@ -54,7 +56,7 @@ def test_behind_a_gear_an_order_is_any_number_and_has_an_error(order: float, fou
     q = np.sort(np.random.default_rng(1).uniform(-1, 2, 4000))
     block = np.arange(4000) // 100
     y = 0.3 * np.sin(order * q) + 0.4 * np.cos(order * q) + 0.2 * np.random.default_rng(2).normal(size=4000)
-    line = ripple._line(Residual(q, y, block), ORDERS, 3)
+    line = ripple._line(Residual(q, y, block, np.ones_like(q)), ORDERS, 3)
     assert line is not None
     exact, x, covariance = line
     p = TorqueRipple(1).estimates(three_axis(), x, covariance, exact)
@@ -93,7 +95,7 @@ def test_noise_has_no_line_nor_has_what_a_few_blocks_hold() -> None:
 def even(*waves: tuple[int, float]) -> Residual:
     """Eight turns at an even speed, of which waves of whole orders are orthogonal, in forty blocks."""
     q = 16 * np.pi * np.arange(4000) / 4000
-    return Residual(q, np.sum([a * np.sin(k * q) for k, a in waves], axis=0), np.arange(4000) // 100)
+    return Residual(q, np.sum([a * np.sin(k * q) for k, a in waves], axis=0), np.arange(4000) // 100, 0 * q)
 
 
 @pytest.mark.parametrize(("share", "found"), [(0.0051, True), (0.0049, False)])
@@ -109,7 +111,7 @@ def test_the_chance_is_student_s_of_what_blocks_gain(
 ) -> None:
     """Each block by itself, whatever its size, beside fits of the other folds; for any order of any joint."""
     left = residual(0.5, 0.5, blocks=20, there=range(0, 20, 2))
-    left = Residual(left.q, left.left * np.where(left.block == 5, 2.0, 1.0), left.block)
+    left = replace(left, left=left.left * np.where(left.block == 5, 2.0, 1.0))
     gains = []
     for k in range(20):
         X = np.column_stack([np.sin(100 * left.q), np.cos(100 * left.q)])
@@ -150,10 +152,38 @@ def test_what_the_corner_takes_away_is_left_of_the_torque() -> None:
             times = np.where(first, 1.0, 2.0)
             np.testing.assert_allclose(left.left, times * np.sin(2 * np.pi * 60 * at), atol=0.05)
             assert sorted(set(left.block)) == [*range(12)]
+            np.testing.assert_allclose(left.v, v[0, j], atol=1e-3)
             assert at[~first].max() == pytest.approx(5.0, abs=0.1)
             # to half a sample, 5 ms apart
             assert at[first].min() == pytest.approx(known[0] + 0.005, abs=0.0025)
             assert at[first].max() == pytest.approx(known[-2], abs=0.0025)
+
+
+@pytest.mark.parametrize("exact", [100.0, 100.4])
+def test_the_amplitude_is_what_the_drive_shows_below_the_corner_if_it_shows_less_beyond(exact: float) -> None:
+    """There slowly and back so fast that the joint's inertia takes up half of it."""
+    q = np.concatenate([np.linspace(-3, 3, 2000), np.linspace(3, -3, 2000)])
+    fast, block = np.arange(4000) >= 2000, np.arange(4000) // 100
+    noise = 0.1 * np.random.default_rng(1).normal(size=4000)
+    # a wave of 0.5 N·m: 100 times per radian, by 0.1 and 1 rad/s at a corner of 2 Hz
+    wave = 0.3 * np.sin(exact * q) + 0.4 * np.cos(exact * q)
+    slowed = Residual(q, noise + np.where(fast, 0.5, 1.0) * wave, block, np.where(fast, -1.0, 0.1))
+    line = ripple._line(slowed, ORDERS, 3)
+    assert line is not None
+    order, x, covariance = line
+    assert np.hypot(*x[:2]) == pytest.approx(0.5 * 0.75, rel=0.05)
+    own, spread = ripple._below(slowed, line, 2.0)
+    error = np.sqrt(np.diag(spread))
+    assert len(own) == len(x) and (np.abs(own[:2] - [0.3, 0.4]) < 4 * error[:2]).all()
+    assert error[:2] == pytest.approx(0.1 * np.sqrt(2 / 2000), rel=0.5)
+    # as strong at any speed: all samples tell more
+    alike = replace(slowed, left=noise + wave)
+    line = ripple._line(alike, ORDERS, 3)
+    assert line is not None and ripple._below(alike, line, 2.0)[0] is line[1]
+    # too little was recorded below the corner
+    for few in (np.where(block < 9, 0.1, 1.0), np.ones(4000)):
+        few_left = replace(slowed, v=few)
+        assert ripple._below(few_left, (order, x, covariance), 2.0)[0] is x
 
 
 @pytest.mark.parametrize("samples", [499, 500])
@@ -162,7 +192,7 @@ def test_joints_that_turn_are_asked_until_nothing_is_left_three_times_at_most(
 ) -> None:
     """A SCARA: the third joint slides."""
     arm, asked = load_arm("scara"), []
-    own = Residual(np.zeros(samples), np.full(samples, 9.0), np.zeros(samples, dtype=int))
+    own = Residual(np.zeros(samples), np.full(samples, 9.0), np.zeros(samples, dtype=int), np.zeros(samples))
 
     def line(left: Residual, orders: Any, joints: int) -> Any:
         asked.append(float(left.left[0]))

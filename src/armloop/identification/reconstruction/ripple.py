@@ -5,6 +5,10 @@ torques are regressed. So the residual is taken on the unfiltered torque, and it
 is searched for lines (:mod:`reconstruction.lines`), which must keep their phase from block to block, and help on blocks
 left out. A strong ripple of low order is none of these: it passes the low-pass, and the base parameters soak part of it
 up, so it is one of the laws that are fitted beside them (:mod:`reconstruction.catalogue`).
+
+Beyond the corner the ripple shakes the links, whose inertia takes up a part of it that the model's motion does not show: the
+drive shows the rest. Where what it shows below the corner differs, that is the amplitude (Hausman's test: of two estimates
+the one that is consistent, if they differ by more than it errs).
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 from scipy.stats import t as student
 
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers
@@ -32,15 +37,22 @@ _BAND = 0.4
 #: Part of the residual that a line must hold.
 _WORTH = 0.005
 _FEWEST = 500
+#: … in so many blocks at least, where an amplitude is of some of the samples.
+_BLOCKS = 10
 
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """What a model leaves of one joint's unfiltered torque, (M,) each, with the block of each sample."""
+    """What a model leaves of one joint's unfiltered torque, (M,) each, with the block of each sample and its speed."""
 
     q: Array
     left: Array
     block: Index
+    v: Array
+
+    def only(self, rows: Mask) -> Residual:
+        """The same of some of the samples."""
+        return Residual(self.q[rows], self.left[rows], self.block[rows], self.v[rows])
 
 
 def find_ripple(
@@ -66,9 +78,10 @@ def find_ripple(
             line = _line(left, orders, model.arm.n)
             if line is None:
                 break
-            order, x, covariance = line
-            found.append(AddedEffect(effect, effect.estimates(model.arm, x, covariance, order), "always"))
-            left = Residual(left.q, left.left - waves(left.q, order) @ x[:2], left.block)
+            order, x, _ = line
+            stated = effect.estimates(model.arm, *_below(left, line, samples.cutoff_hz), order)
+            found.append(AddedEffect(effect, stated, "always"))
+            left = replace(left, left=left.left - waves(left.q, order) @ x[:2])
     return found
 
 
@@ -91,14 +104,31 @@ def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Arr
         score, blocks = block_score(y**2, after**2, left.block)
         if score > student.isf(CHANCE / (len(orders) * joints), blocks - 1):
             exact = between(left.q, y, order, blocks)
-            X = waves(left.q, exact)
-            x = np.asarray(np.linalg.lstsq(X, y, rcond=None)[0], dtype=float)
-            rest = y - X @ x
-            if exact != order:
-                X, x = np.column_stack([X, change(left.q, exact, x)]), np.append(x, 0.0)
-            bread = np.asarray(np.linalg.inv(X.T @ X), dtype=float)
-            return exact, x, block_covariance(bread, X * rest[:, None], left.block)
+            return exact, *_coefficients(left, exact, exact != order)
     return None
+
+
+def _coefficients(left: Residual, order: float, moved: bool) -> tuple[Array, Array]:
+    """Least-squares coefficients of sine and cosine, and of a change of the order if it was moved; their covariance."""
+    X, y = waves(left.q, order), left.left
+    x = np.asarray(np.linalg.lstsq(X, y, rcond=None)[0], dtype=float)
+    rest = y - X @ x
+    if moved:
+        X, x = np.column_stack([X, change(left.q, order, x)]), np.append(x, 0.0)
+    bread = np.asarray(np.linalg.inv(X.T @ X), dtype=float)
+    return x, block_covariance(bread, X * rest[:, None], left.block)
+
+
+def _below(left: Residual, line: tuple[float, Array, Array], corner_hz: float) -> tuple[Array, Array]:
+    """A line's coefficients and covariance, or those below the corner where they differ and enough was recorded there."""
+    order, x, covariance = line
+    slow = left.only(order * np.abs(left.v) <= 2 * np.pi * corner_hz)
+    if len(slow.q) < _FEWEST or len(np.unique(slow.block)) < _BLOCKS:
+        return x, covariance
+    own, spread = _coefficients(slow, order, len(x) > 2)
+    apart = (own - x)[:2]
+    differs = apart @ np.linalg.solve(spread[:2, :2], apart) > chi2.isf(CHANCE, 2)
+    return (own, spread) if differs else (x, covariance)
 
 
 def _residuals(
@@ -107,7 +137,7 @@ def _residuals(
     """Per joint, what the model leaves of the unfiltered torque where the joint moves; and the sample period, s."""
     fine = replace(model.conditioning, oversampling=1e9)
     runs = samples.motion.runs()
-    collected: list[list[tuple[Array, Array, Index]]] = [[] for _ in range(model.arm.n)]
+    collected: list[list[tuple[Array, Array, Index, Array]]] = [[] for _ in range(model.arm.n)]
     following = number = 0
     period = samples.period
     speeds = Speeds.of_all(logs, fine.cutoff_hz)
@@ -130,7 +160,9 @@ def _residuals(
             fitted = ~held_out[nearest]
             for j in range(model.arm.n):
                 rows = fitted & low.moving[:, j]
-                collected[j].append((low.motion.q[rows, j], left[rows, j], block[rows]))
+                collected[j].append(
+                    (low.motion.q[rows, j], left[rows, j], block[rows], low.motion.v[rows, j])
+                )
     return [
         Residual(*(np.concatenate(column) for column in zip(*own, strict=True))) for own in collected
     ], period
