@@ -166,7 +166,8 @@ class Account:
     def foretells(self, evidence: Evidence, contacts: list[Contact], residual: Array) -> bool:
         """Whether effects predict, fitted to a run without these events, most of what each of them explains there.
 
-        A push has nothing to do with what the run is like before and after it; a law that shows most at times has.
+        A push has nothing to do with what the run is like before and after it; a law that shows most at times has. What is
+        fitted anew are coefficients; nonlinear parameters stay as they were, and say nothing of a size.
 
         Args:
             evidence: the run without the events.

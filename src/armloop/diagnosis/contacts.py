@@ -20,9 +20,8 @@ from armloop.diagnosis.judgement import FREEDOM, MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import FEW, PAUSE, SHORTEST, Contact, around, push
-from armloop.laws.effects import Effect
 from armloop.laws.effects.events import during, ends
-from armloop.model import AddedEffect, ReconstructedModel
+from armloop.model import AddedEffect
 from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
@@ -255,7 +254,7 @@ def _standing_out(motion: Motion, rows: Index, level: Array, bursts: list[Burst]
     rest = np.maximum(level[outside].max(axis=0, initial=0.0), 1.0)
     kept = []
     for burst in bursts:
-        peak = level[_within(rows, burst.rows)].max(axis=0, initial=0.0)
+        peak = level[within(rows, burst.rows)].max(axis=0, initial=0.0)
         if any(peak[j] >= STANDS_OUT * rest[j] for j in burst.joints):
             kept.append(burst)
     return kept
@@ -310,7 +309,7 @@ def _comes_back(evidence: Evidence, rows: Index, level: Array, burst: Burst) -> 
     motion = evidence.samples.motion
     q, v = motion.q[rows], motion.v[rows]
     joints = sorted(burst.joints)
-    inside = _within(rows, burst.rows)
+    inside = within(rows, burst.rows)
     length = inside.stop - inside.start
     if length == 0:
         return False
@@ -326,7 +325,7 @@ def _comes_back(evidence: Evidence, rows: Index, level: Array, burst: Burst) -> 
     return len(there) > 0 and 2 * sum(there) > len(there)
 
 
-def _within(rows: Index, stretch: slice) -> slice:
+def within(rows: Index, stretch: slice) -> slice:
     """Which of some samples (M,), in order, lie in a stretch."""
     return slice(*np.searchsorted(rows, [stretch.start, stretch.stop]).tolist())
 
@@ -364,7 +363,7 @@ def _bursts(motion: Motion, rows: Index, new: Array) -> list[slice]:
     level = np.abs(new)
     threshold = _RISE * max(1.0, float(np.median(level)))
     for run in motion.runs():
-        mine = _within(rows, run)
+        mine = within(rows, run)
         above = mine.start + np.flatnonzero(level[mine] > threshold)
         if len(above) == 0:
             continue
@@ -394,58 +393,3 @@ def without(evidence: Evidence, contacts: list[Contact]) -> Evidence:
     for contact in contacts:
         rows &= ~contact.rows[:, None]
     return evidence.only(rows)
-
-
-def told(whole: Evidence, evidence: Evidence, contact: Contact, laws: Sequence[Effect]) -> bool:
-    """Whether an event can be told from a law of the motion where a run is too short to search for one.
-
-    A joint that shows it leaves a multiple of what it leaves at other times, when a law would show, too; or it does not
-    slide at all. And no law of these joints explains the run as well.
-
-    Args:
-        whole: the run.
-        evidence: the run without its events.
-        laws: laws that leave no more of it than all events do.
-    """
-    if any(law.joint is None or contact.shown & set(law.indices) for law in laws):
-        return False
-    left, scale = (evidence.residual([]) / evidence.scale) ** 2, evidence.scale
-
-    def stands_out(j: int) -> bool:
-        rows = evidence.rows[:, j]
-        if not whole.rows[:, j].any():
-            return True
-        usual = max(float(left[rows, j].mean()), 1.0) if rows.any() else np.inf
-        return bool((contact.before[j] / scale[j]) ** 2 >= MULTIPLE**2 * usual)
-
-    return any(stands_out(j) for j in contact.shown)
-
-
-def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joints: Sequence[int]) -> bool:
-    """Whether an event removes no more than is left, outside of all events, of some stretch of its run that is as long.
-
-    As long in samples that count: where the joint rests nothing is left to see, in a program with dwells of any stretch.
-    Each joint counts by its part of what the event removes, as for effects that an unknown rest outweighs.
-
-    Args:
-        evidence: the run without its events.
-        model: that with the effects found.
-        joints: those (0-based) of which something real is left that nothing accounts for; less than twice the baseline
-            does not count.
-    """
-    motion, kept, rows = evidence.samples.motion, evidence.independent, evidence.rows
-    left = (np.where(rows, evidence.left_by(model), 0.0)[kept] / evidence.scale) ** 2
-    start, end = ends(contact.added.parameters)
-    time = motion.time[kept]
-    length = max(int((contact.rows[kept] & (time >= start) & (time <= end)).sum()), 1)
-    removed = np.maximum(contact.before**2 - contact.after**2, 0.0) / evidence.scale**2
-    rest = np.zeros(len(removed))
-    for j in joints:
-        if left[:, j].sum() < MULTIPLE**2 * rows[:, j].sum():
-            continue
-        for run in motion.runs():
-            within = _within(kept, run)
-            sums = np.cumsum(np.append(0.0, left[within, j][rows[kept, j][within]]))
-            most = float((sums[length:] - sums[:-length]).max(initial=0.0)) / length
-            rest[j] = max(rest[j], most - 1.0)
-    return bool(removed @ (removed - rest) < 0)

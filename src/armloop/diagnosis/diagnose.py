@@ -15,7 +15,8 @@ from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
 from armloop.diagnosis.account import Account, best_account, laws_instead
 from armloop.diagnosis.carried import account_with_load
-from armloop.diagnosis.contacts import Contact, drowned, find_contacts, known_contacts, told, without
+from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
+from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.reasons import Standing, event_in_doubt, event_untold, in_doubt, standing, too_still

@@ -46,7 +46,7 @@ def test_some_of_many_logs_are_looked_at_and_of_each_some_of_its_runs(
 
 def unread(samples: int) -> Any:
     """A log of one run that says which of its rows are taken."""
-    log = SimpleNamespace(samples=samples, runs=lambda: [slice(0, samples)])
+    log = SimpleNamespace(samples=samples, period=0.01, runs=lambda: [slice(0, samples)])
     log.read, log.stretch = lambda: log, lambda rows: rows
     return log
 

@@ -295,7 +295,7 @@ def _finished(
 
 
 def _velocity_noise(samples: Samples) -> dict[str, list[float]]:
-    """What the dead zones of the training logs went by, which those of later logs are no narrower than."""
+    """What the dead zones of the training logs went by, by which a later log's reversals are told from rest."""
     return {} if samples.velocity_noise is None else {"velocity_noise": samples.velocity_noise.tolist()}
 
 

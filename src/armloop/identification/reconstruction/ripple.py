@@ -17,8 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import t as student
+from scipy.stats import f, t
 
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers
 from armloop.data.log import MotionLog
@@ -81,6 +80,7 @@ def find_ripple(
             order, x, _ = line
             stated = effect.estimates(model.arm, *_below(left, line, samples.cutoff_hz), order)
             found.append(AddedEffect(effect, stated, "always"))
+            # what is taken off is what the drive shows of it at all speeds, else the rest would be a line again
             left = replace(left, left=left.left - waves(left.q, order) @ x[:2])
     return found
 
@@ -98,11 +98,11 @@ def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Arr
     for order in lines(left.q, left.left, orders.tolist(), _WORTH):
         X, y = waves(left.q, order), left.left
         after, fold = np.array(y), left.block % FOLDS
-        for f in range(FOLDS):
-            mine = fold == f
+        for k in range(FOLDS):
+            mine = fold == k
             after[mine] -= X[mine] @ np.linalg.lstsq(X[~mine], y[~mine], rcond=None)[0]
         score, blocks = block_score(y**2, after**2, left.block)
-        if score > student.isf(CHANCE / (len(orders) * joints), blocks - 1):
+        if score > t.isf(CHANCE / (len(orders) * joints), blocks - 1):
             exact = between(left.q, y, order, blocks)
             return exact, *_coefficients(left, exact, exact != order)
     return None
@@ -123,12 +123,14 @@ def _below(left: Residual, line: tuple[float, Array, Array], corner_hz: float) -
     """A line's coefficients and covariance, or those below the corner where they differ and enough was recorded there."""
     order, x, covariance = line
     slow = left.only(order * np.abs(left.v) <= 2 * np.pi * corner_hz)
-    if len(slow.q) < _FEWEST or len(np.unique(slow.block)) < _BLOCKS:
+    blocks = len(np.unique(slow.block))
+    if len(slow.q) < _FEWEST or blocks < _BLOCKS:
         return x, covariance
     own, spread = _coefficients(slow, order, len(x) > 2)
     apart = (own - x)[:2]
-    differs = apart @ np.linalg.solve(spread[:2, :2], apart) > chi2.isf(CHANCE, 2)
-    return (own, spread) if differs else (x, covariance)
+    # Hotelling's test: a covariance of few blocks is uncertain itself
+    bound = 2 * (blocks - 1) / (blocks - 2) * f.isf(CHANCE, 2, blocks - 2)
+    return (own, spread) if apart @ np.linalg.solve(spread[:2, :2], apart) > bound else (x, covariance)
 
 
 def _residuals(

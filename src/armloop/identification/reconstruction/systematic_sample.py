@@ -38,12 +38,12 @@ def placed_runs(logs: Sequence[LogSource], thinned_hz: float = np.inf) -> list[t
     Args:
         thinned_hz: rate to which a filter thins them afterwards; samples beyond it are no further ones.
     """
-    rate = 0.0 if np.isinf(thinned_hz) else 1 / logs[0].read().period
-    whole = _SAMPLES * max(1.0, rate / thinned_hz)
+    first = logs[0].read()
+    whole = _SAMPLES * max(1.0, 1 / (first.period * thinned_hz))
     picked, found = selected(logs, whole), []
     most = int(whole / len(picked))
     for k in picked:
-        log = logs[k].read()
+        log = logs[k].read() if k else first  # which is always among them
         runs = sorted(log.runs(), key=lambda run: run.start - run.stop)
         runs = [run for run in runs if run.stop - run.start >= FEWEST_SAMPLES] or runs[:1]
         count = max(1, min(len(runs), int(np.ceil(len(runs) * most / max(log.samples, 1)))))
