@@ -316,7 +316,9 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
     kept[[3, 25], [0, 1]] = False
     rows[:7, 0] = rows[10:16, 1] = True
     independent = np.arange(N) != 8
-    monkeypatch.setattr(reversals, "passing", lambda samples: turns)
+    wide: Any = "with the dead zones of training"
+    monkeypatch.setattr(reversals, "_as_in_training", lambda evidence: wide)
+    monkeypatch.setattr(reversals, "passing", lambda given: turns & (given is wide))
     monkeypatch.setattr(reversals, "independent_rows", lambda samples: independent)
     monkeypatch.setattr(reversals, "Known", SimpleNamespace(of=lambda *_: SimpleNamespace(fit=None)))
     asked: list[Any] = []
