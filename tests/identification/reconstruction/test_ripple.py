@@ -200,6 +200,8 @@ def test_joints_that_turn_are_asked_until_nothing_is_left_three_times_at_most(
 
     monkeypatch.setattr(ripple, "_residuals", lambda *_: ([own] * 4, 0.01))
     monkeypatch.setattr(ripple, "_line", line)
+    # stated is what is there below the corner
+    monkeypatch.setattr(ripple, "_below", lambda left, line, corner: (line[1] * corner / 2, line[2]))
     monkeypatch.setattr(ripple.TorqueRipple, "shapes", lambda self, context: [1.0, 2.0])
     model: Any = SimpleNamespace(arm=arm)
     sampled: Any = SimpleNamespace(cutoff_hz=1.0, motion=None)
@@ -212,5 +214,7 @@ def test_joints_that_turn_are_asked_until_nothing_is_left_three_times_at_most(
     assert asked == [9.0, 7.0, 5.0, 9.0, 7.0, 9.0, 7.0, 5.0]
     assert [added.effect.joint for added in found] == [1, 1, 1, 2, 4, 4, 4]
     assert {added.when for added in found} == {"always"}
+    amplitudes = [added.parameters["amplitude"].value for added in found]
+    assert amplitudes == pytest.approx([np.hypot(3, 2) / 2] * 7)
     sampled.cutoff_hz = 0.0
     assert ripple.find_ripple(model, [], sampled, nothing) == [] and three_axis().n == 3
