@@ -136,6 +136,7 @@ class TestFinding:
         monkeypatch.setattr(contacts, "at_rest", lambda samples: np.arange(200).reshape(100, 2) >= 180)
         monkeypatch.setattr(contacts, "outlying", lambda evidence, residual: [slice(10, 20), slice(60, 70)])
         monkeypatch.setattr(contacts, "push", push)
+        monkeypatch.setattr(contacts, "torque_on", lambda *given: push(*given[:-1], [given[-1]]))
         scanned = [
             SimpleNamespace(rows=slice(a, b), joint=j, level=innovation) for a, b, j in of.get("beside", ())
         ]
@@ -183,12 +184,16 @@ class TestFinding:
 
         def push(rows: slice, own: list[int]) -> Any:
             asked.append(own)
-            name, joint, share = told[tuple(own)]
+            if tuple(own) not in told:
+                return None
+            name, joint, share, *rivals = told[tuple(own)]
             time, inside = motion().time, np.zeros(100, dtype=bool)
             inside[rows] = True
             added = AddedEffect(effect(name, joint), event(time[rows.start], time[rows.stop - 1]).parameters)
             before = np.where([0 in own, 1 in own], [3.0, 4.0], 0.0)
-            return contacts.Contact(added, inside, before, before, share, share, shown=frozenset(own))
+            return contacts.Contact(
+                added, inside, before, before, share, share, rivals=rivals, shown=frozenset(own)
+            )
 
         def named(*bursts: tuple[int, int, int]) -> list[tuple[int | None, frozenset[int]]]:
             asked.clear()
@@ -206,25 +211,33 @@ class TestFinding:
             return [(one.added.effect.joint, one.shown) for one in kept]
 
         pair, both = [(40, 50, 0), (41, 50, 1)], frozenset({0, 1})
-        force: tuple[str, int | None, float] = ("external_contact", None, 0.849)
+        force: tuple[Any, ...] = ("external_contact", None, 0.849)
         told = {(0, 1): force, (0,): ("external_torque", 1, 0.9), (1,): ("external_torque", 2, 0.9)}
         assert named(*pair) == [(1, both), (2, both)] and asked == [[0, 1], [0], [1]]
         told[0, 1] = ("external_contact", None, 0.851)
         assert named(*pair) == [(None, both)]
-        # so is a single torque, and one joint has but one
-        told[0, 1] = ("external_torque", 2, 0.851)
+        # a single torque is one of them, and no freedom more: 16 of 25 parts are of joint 2
+        told[0, 1] = ("external_torque", 2, 0.883)
         assert named(*pair) == [(2, both)]
-        told[0, 1] = ("external_torque", 2, 0.849)
+        told[0, 1] = ("external_torque", 2, 0.881)
         assert named(*pair) == [(1, both), (2, both)]
+        # unless a force explains as much as both
+        told[0, 1] = ("external_torque", 2, 0.87, (effect("external_contact", None), 0.883))
+        assert named(*pair) == [(2, both)]
+        told[0, 1] = ("external_torque", 2, 0.87, (effect("external_torque", 1), 0.883))
+        assert named(*pair) == [(1, both), (2, both)]
+        # one joint has but one
         assert named((40, 50, 0)) == [(1, frozenset({0}))] and asked == [[0]]
         # what no torque explains at one of the joints is a force
-        told[0, 1], told[1,] = ("external_contact", None, 0.6), ("external_contact", None, 0.9)
+        told[0, 1] = ("external_contact", None, 0.6)
+        last = told.pop((1,))
         assert named(*pair) == [(None, both)]
+        told[1,] = last
         # what is another event's does not tell of it
         assert self.pushed(monkeypatch, *pair)[1] == (40, 50, [0], [60, 0])
         assert self.pushed(monkeypatch, *pair, (80, 85, 0))[1] == (40, 50, [0], [55, 0])
         # many joints tell a force
-        told[0, 1], told[1,] = force, ("external_torque", 2, 0.9)
+        told[0, 1] = force
         monkeypatch.setattr(contacts, "FEW", 2)
         assert named(*pair) == [(None, both)] and asked == [[0, 1]]
 

@@ -1,8 +1,8 @@
 """A double pendulum with quasi-direct drives: encoders that are zeroed by hand, and torque pulses of known time and joint.
 
 What came out: zeros that differ by two hundredths of a radian, without which 27 and 12 % of the torque are left and with
-which 17 and 7.7 %; 15 of 18 pulses, 14 with their joint, and no event in twenty clean runs. Two of the others act while
-joint 1 stands still, held by its friction.
+which 17 and 7.7 %; 15 of 18 pulses with their joint, and no event in twenty clean runs. Two of the others act while joint 1
+stands still, held by its friction.
 """
 
 from pathlib import Path
@@ -56,7 +56,7 @@ def test_zeros_set_by_hand_are_found_and_halve_what_the_model_leaves(model: Reco
 
 
 @pytest.mark.slow
-def test_three_pulses_in_four_are_found_with_their_joint(model: ReconstructedModel, pendulum: Path) -> None:
+def test_four_pulses_in_five_are_found_with_their_joint(model: ReconstructedModel, pendulum: Path) -> None:
     found = total = 0
     for path in sorted(pendulum.glob("acrobot_pushed_0?.csv")):
         events = [contact.added for contact in judged(model, path).contacts]
@@ -68,7 +68,7 @@ def test_three_pulses_in_four_are_found_with_their_joint(model: ReconstructedMod
                 and event.parameters["end"].value > start
                 for event in events
             )
-    assert total == 18 and found >= 14
+    assert total == 18 and found >= 15
 
 
 @pytest.mark.long

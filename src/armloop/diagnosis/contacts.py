@@ -19,7 +19,7 @@ from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innova
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
-from armloop.diagnosis.pushes import FEW, PAUSE, SHORTEST, Contact, around, push
+from armloop.diagnosis.pushes import FEW, PAUSE, SHORTEST, Contact, around, push, torque_on
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect
 from armloop.util.arrays import TINY, Array, Index, Mask
@@ -137,15 +137,27 @@ def _one_or_each(
         for other in bursts:
             if other is not burst and j in other.joints:
                 own[other.rows, j] = False
-        torque = push(evidence, residual, burst.rows, own, [j])
-        if torque is None or torque.added.effect.joint is None:
+        torque = torque_on(evidence, residual, burst.rows, own, j)
+        if torque is None:
             return [one] if one else []
         each.append(replace(torque, shown=burst.joints))
-    if one and sum(
-        (torque.share - FREEDOM) * _energy(evidence, torque) for torque in each
-    ) <= one.share * _energy(evidence, one):
+    if one and _apart(evidence, one, each) <= _together_explain(one) * _energy(evidence, one):
         return [one]
     return each
+
+
+def _apart(evidence: Evidence, one: Contact, each: Sequence[Contact]) -> float:
+    """What a torque on each joint surely explains; that which is the one event itself is no freedom more than it."""
+    own = one.added.effect.joint
+    return sum(
+        (torque.share - (FREEDOM if torque.added.effect.joint != own else 0.0)) * _energy(evidence, torque)
+        for torque in each
+    )
+
+
+def _together_explain(one: Contact) -> float:
+    """Largest share of what a burst's joints leave that one event explains: it, or a force that does as well."""
+    return max([one.share, *(share for rival, share in one.rivals if rival.joint is None)])
 
 
 def _quiet(evidence: Evidence, residual: Array, tells: Mask, joints: frozenset[int]) -> Mask:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -132,6 +133,16 @@ def push(
     return _somewhere(best, [p for p in points if p and p.share >= most - FREEDOM and not p.contradicted])
 
 
+def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, joint: int) -> Contact | None:
+    """The torque on a joint (0-based) in a stretch of samples; None where it does not explain most of what that joint shows.
+
+    Args: as of `push`.
+    """
+    kind = _Kind(effect("external_torque", joint + 1))
+    trial = _trial(evidence, residual, counted / evidence.scale, burst, kind, [joint])
+    return trial if trial is not None and trial.own >= MOSTLY else None
+
+
 def _somewhere(found: Contact, points: list[Contact]) -> Contact:
     """A force on one of these points, nobody knows on which: its error, and its link's, by the law of total variance."""
     forces = [point.added.parameters["force"] for point in (found, *points)]
@@ -150,9 +161,7 @@ def _somewhere(found: Contact, points: list[Contact]) -> Contact:
 def _trial(
     evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind, shown: list[int]
 ) -> Contact | None:
-    motion = evidence.samples.motion
-    for _ in range(REFINEMENTS):
-        burst = _interval(evidence, residual, weight, burst, kind)
+    burst = _best_interval(evidence, residual, weight, burst, kind, shown)
     part, columns, y = _burst(evidence, residual, weight, burst, kind)
     # Every other piece, of those that tell of it, is held out in turn.
     pieces = block_numbers(part, SHORTEST)
@@ -188,7 +197,7 @@ def _trial(
     was, would_be = (_elsewhere(z, weight[burst], pieces, shown) for z in (y, left))
     return Contact(
         AddedEffect(kind.effect, parameters),
-        around(motion, burst),
+        around(evidence.samples.motion, burst),
         before,
         after,
         share,
@@ -213,6 +222,38 @@ def _burst(
     motion = evidence.samples.motion
     part = Motion(motion.time[burst], motion.q[burst], motion.v[burst], motion.vdot[burst], np.array([0]))
     return part, kind.columns(evidence, part) * weight[burst, :, None], residual[burst] * weight[burst]
+
+
+def _best_interval(
+    evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind, shown: list[int]
+) -> slice:
+    """The stretch in and around a burst of which a mean force or torque explains most: matched filtering of a rectangle.
+
+    Sought from all of the burst and from its peak: from a low part of it one may be led away from a far higher one.
+    """
+
+    def explained(stretch: slice) -> float:
+        _, columns, y = _burst(evidence, residual, weight, stretch, kind)
+        return float((y**2).sum() - ((y - columns @ _size(columns, y)) ** 2).sum())
+
+    found = []
+    for stretch in (burst, _peak(evidence, (residual * weight)[:, shown], burst)):
+        for _ in range(REFINEMENTS):
+            stretch = _interval(evidence, residual, weight, stretch, kind)
+        found.append(stretch)
+    return max(found, key=explained)
+
+
+def _peak(evidence: Evidence, weighted: Array, burst: slice) -> slice:
+    """The stretch of a burst around what is highest in it, as far as half of that."""
+    level = np.linalg.norm(weighted[burst], axis=1)
+    top = int(np.argmax(level))
+    low = np.flatnonzero(level < 0.5 * level[top])
+    before, after = low[low < top], low[low > top]
+    shortest = math.ceil(SHORTEST / evidence.samples.period / 2)
+    first = min(int(before[-1]) + 1 if len(before) else 0, top - shortest)
+    last = max(int(after[0]) if len(after) else len(level), top + shortest)
+    return slice(burst.start + max(first, 0), burst.start + min(last, len(level)))
 
 
 def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind) -> slice:
