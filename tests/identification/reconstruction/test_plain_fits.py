@@ -1,5 +1,6 @@
 """Rigid bodies with plain friction, regressed on a record at few instants: errors, power of friction and inertia."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -76,3 +77,15 @@ def test_each_joint_has_two_hundred_instants(
     assert (problem is not None) == enough
     if problem is not None:
         assert len(problem.table.tau) == 100 and len(problem.mass) == 67  # every third of 200 postures
+
+
+def test_columns_under_another_gravity_are_those_of_the_arm_that_stands_so() -> None:
+    """Torques are linear in gravity, so its direction is changed without going through the chain again."""
+    arm, motion = three_axis(), fourier_motion(20.0, 100.0, 1)
+    log = measured(motion, rigid_torque(arm, motion.q, motion.v, motion.vdot), 1)
+    problem = PlainFits.of([log], arm, 10.0)
+    assert problem is not None
+    for down in (np.array([0.6, 0.0, -0.8]), np.array([0.0, 0.0, 1.0])):
+        under, as_of = problem.under(down), problem.as_of(replace(arm, gravity=9.81 * down))
+        assert under.arm.gravity.tolist() == as_of.arm.gravity.tolist()
+        np.testing.assert_allclose(under.table.columns, as_of.table.columns, atol=1e-9)

@@ -14,7 +14,7 @@ import numpy as np
 
 from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning
-from armloop.features.rigid_body import BaseParameters
+from armloop.features.rigid_body import BaseParameters, full_columns
 from armloop.identification.reconstruction.bandwidth import (
     LEAST,
     Table,
@@ -124,14 +124,27 @@ class PlainFits:
 
     def under(self, down: Array) -> Self:
         """The same with gravity in another direction (3,), a unit vector in the base frame."""
-        return self.as_of(replace(self.arm, gravity=float(np.linalg.norm(STANDARD_GRAVITY)) * down))
+        arm = replace(self.arm, gravity=float(np.linalg.norm(STANDARD_GRAVITY)) * down)
+        still, *along = self._by_gravity
+        x, y, z = (g * columns for g, columns in zip(arm.gravity, along, strict=True))
+        return self._with(arm, still + x + y + z)
 
     def as_of(self, arm: Arm) -> Self:
         """The same record as that of another arm of as many joints."""
+        return self._with(arm, full_columns(arm, self.table.motion, rotors=True))
+
+    def _with(self, arm: Arm, full: Array) -> Self:
+        """The same as that of an arm with these columns (N, n, P) of its full parameters."""
         base, table = BaseParameters.of_arm(arm, rotors=True), self.table
-        beside = table.columns[:, :, self.base.count :]
-        columns = np.concatenate([base.columns(arm, table.motion), beside], axis=2)
+        columns = np.concatenate([full[:, :, base.kept], table.columns[:, :, self.base.count :]], axis=2)
         return replace(self, arm=arm, base=base, table=replace(table, columns=columns))
+
+    @cached_property
+    def _by_gravity(self) -> list[Array]:
+        """Columns (N, n, P) of the full parameters without gravity, and what 1 m/s² of it along each axis adds to them."""
+        arms = [replace(self.arm, gravity=g) for g in (np.zeros(3), *np.eye(3))]
+        still, *each = (full_columns(arm, self.table.motion, rotors=True) for arm in arms)
+        return [still, *(columns - still for columns in each)]
 
     def every(self, step: int) -> Self:
         """The same at every so manieth instant."""
