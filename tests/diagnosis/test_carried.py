@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
@@ -49,10 +50,33 @@ def model() -> ReconstructedModel:
     return model_with_baseline()
 
 
+Accounts = tuple[Evidence, Account, Account | None]
+
+
 @pytest.fixture(scope="module")
-def carried(model: ReconstructedModel) -> Diagnosis:
-    """What is found of a run in which the load comes and goes."""
-    return diagnose(model, [run(1, TIMES)], jobs=1)
+def whole(model: ReconstructedModel) -> tuple[Diagnosis, Accounts]:
+    """The diagnosis of a run in which the load comes and goes, and what it weighed: see below."""
+    module, weighed = sys.modules[diagnose.__module__], []
+
+    def best(whole: Evidence, *given: Any) -> Account:
+        weighed[:] = [whole, best_account(whole, *given)]
+        return weighed[1]
+
+    def loaded(*given: Any) -> Account | None:
+        weighed.append(account_with_load(*given))
+        return weighed[2]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "best_account", best)
+        patch.setattr(module, "account_with_load", loaded)
+        found = diagnose(model, [run(1, TIMES)], jobs=1)
+    return found, tuple(weighed)
+
+
+@pytest.fixture(scope="module")
+def carried(whole: tuple[Diagnosis, Accounts]) -> Diagnosis:
+    """What is found of that run."""
+    return whole[0]
 
 
 def evidence(model: ReconstructedModel, *logs: MotionLog) -> Evidence:
@@ -60,11 +84,9 @@ def evidence(model: ReconstructedModel, *logs: MotionLog) -> Evidence:
 
 
 @pytest.fixture(scope="module")
-def accounts(model: ReconstructedModel) -> tuple[Evidence, Account, Account | None]:
+def accounts(whole: tuple[Diagnosis, Accounts]) -> Accounts:
     """The evidence of that run, the best account of it without a load, and with one."""
-    whole = evidence(model, run(1, TIMES))
-    account = best_account(whole, [], silent)
-    return whole, account, account_with_load(whole, account, silent, 1)
+    return whole[1]
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3))])
@@ -264,7 +286,7 @@ def test_a_start_of_too_few_samples_explains_nothing(
 
 
 def test_a_load_at_the_cost_of_other_joints_is_none(
-    accounts: tuple[Evidence, Account, Account | None], monkeypatch: pytest.MonkeyPatch
+    accounts: Accounts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """However much it removes of all joints together."""
     whole, account, with_load = accounts
@@ -283,7 +305,7 @@ def test_a_load_at_the_cost_of_other_joints_is_none(
 
 
 def test_what_is_left_of_samples_that_a_load_leaves_out_speaks_for_none(
-    accounts: tuple[Evidence, Account, Account | None], monkeypatch: pytest.MonkeyPatch
+    accounts: Accounts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A load must explain what is left elsewhere: then nothing is searched anew for one that came and went in these."""
     whole, account, _ = accounts
@@ -318,7 +340,7 @@ def test_of_what_is_no_more_than_the_baseline_a_load_explains_nothing(
 
 
 def test_the_account_with_a_load_is_one_of_the_model_as_it_is(
-    model: ReconstructedModel, accounts: tuple[Evidence, Account, Account | None]
+    model: ReconstructedModel, accounts: Accounts
 ) -> None:
     """What remains of it is what the model leaves with the load once, not twice."""
     whole, _, found = accounts
