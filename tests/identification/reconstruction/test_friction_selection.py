@@ -22,6 +22,9 @@ from armloop.identification.reconstruction.inner_folds import inner_folds
 from armloop.laws.friction import FRICTION_LAWS as LAWS
 from armloop.robot.kinematics import nominal_parameters, regressor
 
+#: Without what takes longest, and nobody looks at here.
+PLAIN = Options(parts=False, standard_errors=False)
+
 
 def a_run(seed: int, by_load: float) -> MotionLog:
     motion = fourier_motion(40.0, 100.0, seed)
@@ -31,7 +34,8 @@ def a_run(seed: int, by_load: float) -> MotionLog:
 
 
 def test_friction_by_load_is_found_where_it_is():
-    result = reconstruct([a_run(1, 0.1), a_run(2, 0.1)], three_axis(), library="rigid-body")
+    logs = [a_run(1, 0.1), a_run(2, 0.1)]
+    result = reconstruct(logs, three_axis(), library="rigid-body", options=PLAIN)
     ladder = {rung["rung"]: rung for rung in result.model.history["friction_ladder"]}
     rung = ladder["Coulomb by load"]
     assert rung["joints"] and rung["after"] < 0.9 * rung["before"]
@@ -41,7 +45,7 @@ def test_friction_by_load_is_found_where_it_is():
 
 def test_without_physics_coefficients_may_have_any_sign():
     logs = [a_run(1, 0.0)]
-    free = reconstruct(logs, three_axis(), library="rigid-body", options=Options(physical=False))
+    free = reconstruct(logs, three_axis(), library="rigid-body", options=replace(PLAIN, physical=False))
     assert "constraints" not in free.model.history
     assert max(free.held_out.moving["nrmse"]) < 0.05
 
@@ -49,7 +53,7 @@ def test_without_physics_coefficients_may_have_any_sign():
 @pytest.mark.parametrize("library", ["rigid-body", pytest.param("lagrangian", marks=pytest.mark.long)])
 def test_only_the_laws_that_are_named_are_chosen(library: str) -> None:
     def kinds(*names: str) -> set[str]:
-        options = Options(friction=names, standard_errors=False)
+        options = replace(PLAIN, friction=names)
         model = reconstruct([a_run(1, 0.1)], three_axis(), library=library, options=options).model
         assert f"friction: nothing but {', '.join(names)} was allowed" in model.history["notes"]
         return {term.kind for joint in model.friction.terms for term in joint}

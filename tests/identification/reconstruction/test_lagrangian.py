@@ -12,7 +12,7 @@ from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
 from armloop.dynamics import Dynamics
 from armloop.features.lagrangian import candidates
-from armloop.identification.reconstruction import Reconstruction, reconstruct
+from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
 from armloop.identification.reconstruction.physical import PhysicalSolution
 from armloop.identification.reconstruction.pooled import Solution
 from armloop.identification.scoring import score
@@ -21,6 +21,9 @@ from armloop.model.components import Lagrangian
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import regressor
 from armloop.util.errors import ExcitationError, ModelError
+
+#: Without what takes longest, and nobody looks at here.
+PLAIN = Options(parts=False, standard_errors=False)
 
 #: Terms of T and U, J per unit: links, and rotors on joints 1 and 2.
 TRUTH = {
@@ -52,7 +55,7 @@ def a_run(seed: int, noise: float = 0.01) -> MotionLog:
 
 @pytest.fixture(scope="module")
 def result() -> Reconstruction:
-    return reconstruct([a_run(1), a_run(2)], three_axis(), library="lagrangian")
+    return reconstruct([a_run(1), a_run(2)], three_axis(), library="lagrangian", options=PLAIN)
 
 
 def test_the_planted_energies_are_found_under_noise(result: Reconstruction):
@@ -170,7 +173,7 @@ def test_without_room_for_a_positive_mass_matrix_the_notes_say_so(monkeypatch: p
     monkeypatch.setattr(
         "armloop.identification.reconstruction.lagrangian.physical_solution", no_room_for_mass
     )
-    notes = reconstruct([a_run(1)], three_axis(), library="lagrangian").notes
+    notes = reconstruct([a_run(1)], three_axis(), library="lagrangian", options=PLAIN).notes
     assert any("contradict a positive definite M(q)" in note for note in notes)
     assert "M(q) is not positive definite at 100.0% of the postures" in notes
     assert any("try --library rigid-body" in note for note in notes)
@@ -181,7 +184,7 @@ def test_where_no_positive_mass_matrix_is_found_the_notes_say_so(monkeypatch: py
         raise ExcitationError("the motion tells too little")
 
     monkeypatch.setattr("armloop.identification.reconstruction.lagrangian.physical_solution", none)
-    found = reconstruct([a_run(1)], three_axis(), library="lagrangian")
+    found = reconstruct([a_run(1)], three_axis(), library="lagrangian", options=PLAIN)
     assert found.model.history["kept_positive"] == "unknown"
     assert any("no coefficients with a positive definite M(q) were found" in note for note in found.notes)
 
@@ -191,7 +194,7 @@ def test_the_weight_of_an_upright_slide_is_gravity_and_no_offset_of_its_friction
     motion = fourier_motion(40.0, 100.0, 3, arm)
     rubs = 0.5 * np.tanh(motion.v / 1e-3) + motion.v
     log = measured(motion, rigid_torque(arm, motion.q, motion.v, motion.vdot) + rubs, 3)
-    model = reconstruct([log], arm, library="lagrangian").model
+    model = reconstruct([log], arm, library="lagrangian", options=PLAIN).model
     (slide,) = np.flatnonzero(~arm.revolute)
     rest = np.zeros((1, arm.n))
     weight = rigid_torque(arm, rest, rest, rest)[0]
@@ -205,7 +208,7 @@ def test_motion_that_tells_nothing_is_refused():
     q, v = 0.3 + 1e-6 * motion.q, 0.04 * np.sign(motion.v) * (1 + 1e-3 * np.cos(motion.q))
     log = MotionLog(motion.time, q, v, 1.0 + friction(v), np.zeros_like(q), name="creep")
     with pytest.raises(ExcitationError, match=r"\d+ of \d+ inertial parameters undetermined"):
-        reconstruct([log], three_axis(), library="lagrangian")
+        reconstruct([log], three_axis(), library="lagrangian", options=PLAIN)
     still = replace(a_run(1), q=motion.q * [1.0, 0.0, 1.0], v=motion.v * [1.0, 0.0, 1.0])
     with pytest.raises(ExcitationError, match=r"^q2: joint 'joint_2' moves in \d+ samples"):
-        reconstruct([still], three_axis(), library="lagrangian")
+        reconstruct([still], three_axis(), library="lagrangian", options=PLAIN)
