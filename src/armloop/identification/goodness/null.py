@@ -69,12 +69,14 @@ def empirical_null(
         if not shapes or len({parts[rows[0]] for rows in own}) < _FEWEST:
             continue
         together = smooth(samples, np.concatenate(shapes, axis=-1))
+        # of the other joints, columns on the effect's own remove nothing
+        joints = [effect.index] if together.ndim == 2 else list(range(model.arm.n))
+        together = together.reshape(len(together), len(joints), -1)
         best = np.zeros((len(own), model.arm.n))
         for k, rows in enumerate(own):
-            X = effect.on_all_joints(together[rows], model.arm.n) / scale[:, None]
-            X = X.reshape(*X.shape[:2], len(shapes), -1)
-            removed = _removed(X, left[rows] / scale, counted[rows])
-            best[k] = removed[removed.sum(axis=1).argmax()]
+            X = (together[rows] / scale[joints, None]).reshape(len(rows), len(joints), len(shapes), -1)
+            removed = _removed(X, left[np.ix_(rows, joints)] / scale[joints], counted[np.ix_(rows, joints)])
+            best[k, joints] = removed[removed.sum(axis=1).argmax()]
         shown = best.sum(axis=1) > 0  # where its columns are nothing it was not seen to remove nothing
         told_by = {parts[rows[0]] for rows, yes in zip(own, shown, strict=True) if yes}
         if len(told_by) >= _FEWEST:
