@@ -61,8 +61,13 @@ class LowPass:
         equal: dict[int, list[slice]] = {}
         for run in runs:
             equal.setdefault(run.stop - run.start, []).append(run)
-        filtered = np.array(x, dtype=float)
+        # columns are many: what is all filtered is not copied first, nor a run that has no equal
+        covered = sum(length * len(some) for length, some in equal.items()) == len(x)
+        filtered = np.empty(x.shape) if covered else np.array(x, dtype=float)
         for some in equal.values():
+            if len(some) == 1:
+                filtered[some[0]] = self(x[some[0]])
+                continue
             together = self(np.stack([x[run] for run in some], axis=1))
             for k, run in enumerate(some):
                 filtered[run] = together[:, k]
