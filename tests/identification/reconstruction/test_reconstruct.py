@@ -37,7 +37,7 @@ def a_run(seed: int, seconds: float = 40.0) -> MotionLog:
 @pytest.fixture(scope="module")
 def together() -> Reconstruction:
     """From Fourier motion alone, which has neither static nor constant-velocity data."""
-    options = Options(max_order=2)
+    options = Options(max_order=2, parts=False, standard_errors=False)
     return reconstruct([a_run(1), a_run(2)], three_axis(), library="double-feature-set", options=options)
 
 
@@ -139,9 +139,8 @@ def test_a_short_file_of_independent_samples_is_not_held_out_as_a_whole():
 def test_inverse_dynamics_samples_are_taken_as_they_are():
     ranges = MotionRanges(*(np.array(x) for x in ([-1.5, -1, -3], [1.5, 1, 3], [1.5] * 3, [3.0] * 3)))
     logs = list(inverse_dynamics_samples(three_axis(), ranges, (400, 1000, 1000), seed=2).values())
-    result = reconstruct(
-        logs, three_axis(), conditioning=Conditioning(cutoff_hz=0), options=Options(max_order=2)
-    )
+    options = Options(max_order=2, parts=False, standard_errors=False)
+    result = reconstruct(logs, three_axis(), conditioning=Conditioning(cutoff_hz=0), options=options)
     assert result.notes == result.model.history["physics"]["faults"]
     assert result.reports[0].orders == [2, 0] and result.reports[0].terms == [0, 2, 1]
 

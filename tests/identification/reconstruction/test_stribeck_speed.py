@@ -24,7 +24,7 @@ def a_run(seed: int, by_load: float = 0.0, speeds: np.ndarray = SPEEDS) -> Motio
 
 
 def test_friction_reads_as_the_law_that_it_is() -> None:
-    options = Options(standard_errors=False)
+    options = Options(standard_errors=False, parts=False)
     result = reconstruct(
         [a_run(seed) for seed in (1, 2, 3)], three_axis(), library="rigid-body", options=options
     )
