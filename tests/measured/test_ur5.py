@@ -32,7 +32,7 @@ def log_of(measured: Path, name: str) -> MotionLog:
 @pytest.fixture(scope="module")
 def model(measured: Path) -> ReconstructedModel:
     arm = load_arm(str(next((measured / "ur5").glob("*.urdf"))))
-    return reconstruct([log_of(measured, name) for name in TRAINING], arm).model
+    return reconstruct([log_of(measured, name) for name in TRAINING], arm, library="rigid-body").model
 
 
 def test_of_a_run_unlike_the_training_logs_it_is_not_claimed_that_the_arm_has_changed(
