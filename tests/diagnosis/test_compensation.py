@@ -84,13 +84,8 @@ PAIRS: dict[str, tuple[tuple[Law, ...], set[str]]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "case",
-    [
-        "a fault and an effect",
-        *(pytest.param(name, marks=pytest.mark.long) for name in PAIRS if "fault and an" not in name),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("case", PAIRS)
 def test_the_augmented_model_leaves_nothing_to_find(model: ReconstructedModel, case: str) -> None:
     laws, names = PAIRS[case]
     log = run(*laws, seed=5)

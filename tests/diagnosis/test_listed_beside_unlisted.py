@@ -36,8 +36,8 @@ def told(
 @pytest.mark.parametrize(
     ("seed", "effect", "listed", "key"),
     [
-        pytest.param(1, "viscous_friction", lambda q, v: v[:, 1], "coefficient", marks=pytest.mark.long),
-        (2, "torque_offset", lambda q, v: np.ones(len(v)), "offset"),
+        (1, "viscous_friction", lambda q, v: v[:, 1], "coefficient"),
+        pytest.param(2, "torque_offset", lambda q, v: np.ones(len(v)), "offset", marks=pytest.mark.long),
     ],
 )
 def test_a_listed_effect_beside_a_law_is_named_as_what_it_is(

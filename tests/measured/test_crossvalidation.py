@@ -7,7 +7,7 @@ import pytest
 
 from armloop.cli import main
 
-pytestmark = pytest.mark.measured
+pytestmark = [pytest.mark.measured, pytest.mark.long]
 
 
 def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
