@@ -19,8 +19,15 @@ from armloop.util.errors import InputError
 Q0 = {"three_axis": [0.2, -0.4, 0.3], "scara": [0.3, 0.5, 0.1, 0.0]}
 
 
-@pytest.mark.parametrize("name", Q0)
-@pytest.mark.parametrize(("hertz", "margin"), [(3.0, 45.0), (8.0, 70.0)])
+@pytest.mark.parametrize(
+    ("name", "hertz", "margin"),
+    [
+        ("three_axis", 3.0, 45.0),
+        ("scara", 8.0, 70.0),
+        pytest.param("three_axis", 8.0, 70.0, marks=pytest.mark.long),
+        pytest.param("scara", 3.0, 45.0, marks=pytest.mark.long),
+    ],
+)
 def test_every_joint_by_itself_has_bandwidth_and_margin(name, hertz, margin):
     plant = load_plant(name)
     linear = posture_model(plant.arm, plant.config.friction, Q0[name])

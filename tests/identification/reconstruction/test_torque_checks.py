@@ -31,7 +31,7 @@ def exchanged(log: MotionLog, i: int, j: int, *keys: str) -> MotionLog:
     return unchecked_log(**{**vars(log), **{key: getattr(log, key)[:, order] for key in keys}})
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3, 4))])
 @pytest.mark.parametrize("dry", [1.0, 0.3])
 def test_turned_and_exchanged_columns_are_named(seed: int, dry: float) -> None:
     log = run(seed, dry)
@@ -47,7 +47,7 @@ def test_turned_and_exchanged_columns_are_named(seed: int, dry: float) -> None:
             check_torques([exchanged(log, i, j, "tau")], three_axis(), 10.0)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("dry", [1.0, 0.3])
 @pytest.mark.parametrize("factor", [10.0, 100.0])
 def test_a_gain_far_off_is_named(seed: int, dry: float, factor: float) -> None:
