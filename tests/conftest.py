@@ -14,7 +14,17 @@ import pytest  # noqa: E402
 REPOSITORY = Path(__file__).resolve().parents[1]
 MEASURED = REPOSITORY.parent / "shared" / "data"
 #: The files that take longest, first every command of the README.
-LONGEST = ("fresh/test_readme.py", "diagnosis/test_diagnosis.py", "measured/test_ur10e.py")
+LONGEST = (
+    "fresh/test_readme.py",
+    "measured/test_ur10e.py",
+    "diagnosis/test_diagnosis.py",
+    "blind/test_blind.py",
+    "diagnosis/test_carried.py",
+    "measured/test_ur5.py",
+    "identification/reconstruction/test_mounting.py",
+    "identification/reconstruction/test_readings.py",
+    "workflows/test_by_hand.py",
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
