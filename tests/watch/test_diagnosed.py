@@ -74,8 +74,13 @@ def test_a_late_log_that_changes_what_an_alarm_says_is_heeded(
 
 
 def test_an_alarm_of_sums_alone_is_diagnosed_when_it_is_asked_for(
-    models: Path, fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    models: Path,
+    fleet: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("armloop.watch.diagnosed._DIAGNOSED", 50.0)  # two logs tell as well as seven
     store = tmp_path / "store"
     call = ["watch", "--models", str(models), "--logs", str(fleet / "logs" / "loaded"), "--store", str(store)]
     assert main([*call, "--sums-only"]) == 3
@@ -85,7 +90,7 @@ def test_an_alarm_of_sums_alone_is_diagnosed_when_it_is_asked_for(
     assert "told before (1): loaded: payload since 2026-01-03" in said
     assert "diagnosed now:" in said and "effects found" in said
     (alarm,) = Store(store).alarms()
-    assert alarm["diagnosis"]["effects"][0]["effect"] == "payload"
+    assert alarm["diagnosis"]["effects"][0]["effect"] == "payload" and len(alarm["diagnosis"]["logs"]) == 2
     before = contents(store)
     for more in ([], ["--sums-only"]):  # it is made once, and kept
         assert main([*call, "--json", *more]) == 0
