@@ -161,7 +161,10 @@ def test_a_push_is_found_with_its_interval_and_force_and_spoils_nothing_else(
     assert (again["verdict"], again["effects"]) == ("no_effect", [])
     # an event of one run is nothing a controller should supply
     q, v, vdot = np.random.default_rng(0).normal(size=(3, 3))
-    alone = diagnose(model, [run(push, seed=7)]).model
+    (drag, event) = diagnosis.model.effects
+    assert (drag.effect.event, event.effect.event) == (False, True)
+    with_drag, alone = (replace(diagnosis.model, effects=own) for own in ((drag,), (event,)))
+    np.testing.assert_allclose(diagnosis.model.feedforward(q, v, vdot), with_drag.feedforward(q, v, vdot))
     np.testing.assert_allclose(alone.feedforward(q, v, vdot), model.feedforward(q, v, vdot))
 
 
@@ -174,7 +177,7 @@ def check_errors(error: dict, joint: int | None, within: float = 1.6) -> None:
     assert error["metric"] == "rmse" and error["held_out"] is True and len(error["unit"]) == 3
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2, pytest.param(3, marks=pytest.mark.long)])
 def test_a_clean_run_shows_no_effect(model: ReconstructedModel, seed: int) -> None:
     answer = diagnose(model, [run(None, seed)]).to_dict()
     assert (answer["verdict"], answer["effects"]) == ("no_effect", [])
