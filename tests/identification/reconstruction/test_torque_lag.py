@@ -16,7 +16,7 @@ from synthetic import COULOMB, VISCOUS, fourier_motion, friction, measured, rigi
 from armloop.data.log import MotionLog
 from armloop.data.signals import FELT, Conditioning, preprocess
 from armloop.diagnosis import diagnose
-from armloop.identification.reconstruction import Reconstruction, reconstruct
+from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
 from armloop.identification.reconstruction import torque_lag as torque_lags
 from armloop.identification.reconstruction.torque_lag import TorqueLag, torque_lag
 from armloop.model import load_model
@@ -159,15 +159,17 @@ def test_the_model_is_of_the_arm_and_says_that_the_record_is_late(tmp_path: Path
 def test_a_late_record_asks_for_no_lower_corner() -> None:
     """As recorded, 50 ms of delay leave so much that a filter which takes most of the motion away leaves less."""
     late = [recorded(seed, 0.05) for seed in (1, 2)]
-    conditioned = reconstruct(late, three_axis(), library="rigid-body").model.conditioning
+    options = Options(parts=False, standard_errors=False)
+    made = reconstruct(late, three_axis(), library="rigid-body", options=options)
+    conditioned = made.model.conditioning
     assert conditioned.torque_lag == pytest.approx(0.05, abs=0.1 * DEAD)
     assert conditioned.cutoff_hz == model_of(DEAD).model.conditioning.cutoff_hz
 
 
 def test_the_recorders_own_lag_is_no_change_and_another_is() -> None:
     model = model_of(DEAD).model
-    assert diagnose(model, [recorded(11, DEAD)], jobs=1).named == []
-    other = diagnose(model, [recorded(12, 3 * DEAD)], jobs=1)
+    assert diagnose(model, [recorded(11, DEAD, 20.0)], jobs=1).named == []
+    other = diagnose(model, [recorded(12, 3 * DEAD, 20.0)], jobs=1)
     assert other.named == [("time_delay", None)]
     (added,) = other.outcome.added()
     seconds = added.parameters["seconds"]

@@ -70,9 +70,9 @@ def test_a_log_that_creeps_tells_no_slope() -> None:
     assert between_logs(left, np.ones_like(slow), replace(motion, v=v), blocks) == [None]
 
 
-def worn(seed: int, dry: float) -> MotionLog:
+def worn(seed: int, dry: float, seconds: float = 40.0) -> MotionLog:
     """A log in which joint 2 has so much more dry friction."""
-    motion = fourier_motion(40.0, 100.0, seed)
+    motion = fourier_motion(seconds, 100.0, seed)
     more = dry * np.array([0.0, 1.0, 0.0]) * np.sign(motion.v)
     return measured(
         motion, rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v) + more, seed
@@ -103,14 +103,14 @@ def test_a_model_says_of_which_joint_and_by_how_much(models: tuple[Any, Any]) ->
 def test_what_differs_from_log_to_log_is_no_change_of_the_next(models: tuple[Any, Any]) -> None:
     """0.5 N·m more at joint 2 are one and a half of its standard deviations, and plain beside logs that are alike."""
     differing, alike = models
-    assert diagnose(differing, [worn(9, 0.5)], jobs=1).named == []
-    assert diagnose(alike, [worn(9, 0.5)], jobs=1).named == [("coulomb_friction", 2)]
-    assert diagnose(differing, [worn(9, 3.0)], jobs=1).named == [("coulomb_friction", 2)]
+    assert diagnose(differing, [worn(9, 0.5, 24.0)], jobs=1).named == []
+    assert diagnose(alike, [worn(9, 0.5, 24.0)], jobs=1).named == [("coulomb_friction", 2)]
+    assert diagnose(differing, [worn(9, 3.0, 24.0)], jobs=1).named == [("coulomb_friction", 2)]
 
 
 def test_the_baseline_of_a_run_holds_what_differs_between_logs(models: tuple[Any, Any]) -> None:
     differing, _ = models
-    found = diagnose(differing, [worn(9, 0.0)], jobs=1)
+    found = diagnose(differing, [worn(9, 0.0, 24.0)], jobs=1)
     spread = friction_spread(differing, found.samples)
     own = np.array(differing.baseline["rmse"])
     expected = np.sqrt(own**2 + np.mean((spread**2).sum(axis=2), axis=0))
