@@ -318,7 +318,7 @@ def test_what_is_left_of_samples_that_a_load_leaves_out_speaks_for_none(
         searched.append(given)
         raise InterruptedError
 
-    monkeypatch.setattr(carrying, "_beside", beside)
+    monkeypatch.setattr(carrying, "account_beside", beside)
     with pytest.raises(InterruptedError):
         account_with_load(whole, account, silent, 1)
     load, unknown = found

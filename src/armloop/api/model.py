@@ -135,7 +135,7 @@ class Model(ReconstructedModel):
                 str(score_table(self.account.held_out, self.arm, units=self.torque_units)),
             ]
         parts.append("\n".join([formulas(self), *self.legend()]))
-        parts += [added.effect.sentence(added.parameters) for added in self.effects]
+        parts += [added.sentence() for added in self.effects]
         if lean := self.history.get("leaning"):
             parts.append(of_a_lean(**lean))
         parts += [of_a_zero(**zero) for zero in self.history.get("zeros", [])]

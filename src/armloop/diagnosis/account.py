@@ -142,6 +142,19 @@ class Account:
             others &= ~mine
         return total + float(weighted[others].sum())
 
+    def everywhere(self, residual: Array, rows: Mask) -> Score:
+        """What judges all that is stated on some rows (N, n) that count, those of events among them.
+
+        Args:
+            residual: (N, n) what effects and law leave, N·m (N); of an event, what it explains is taken off.
+        """
+        left = (residual / self.evidence.scale) ** 2
+        for contact in self.contacts:
+            left[contact.rows] *= 1 - contact.share
+        left[self.evidence.rows] = self._held_out() ** 2
+        samples, joint = np.nonzero(rows)
+        return Score.of(0, np.sqrt(left[rows]), joint, self.evidence.blocks[samples], rows.shape[1])
+
     def _held_out(self) -> Array:
         """(R,) what effects and law leave of every row, weighted."""
         held_out = self.outcome.after.held_out.copy()

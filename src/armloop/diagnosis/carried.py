@@ -9,21 +9,26 @@ find the nearest. When the load is carried, all samples say; how heavy it is, on
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from armloop.data.signals import smooth
-from armloop.diagnosis.account import Account, best_account
-from armloop.diagnosis.contacts import find_contacts, without
+from armloop.diagnosis.account import Account
+from armloop.diagnosis.beside import (
+    account_beside,
+    at_the_cost_of_others,
+    known_by,
+    known_part,
+    merged,
+    with_account,
+)
+from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
-from armloop.diagnosis.judgement import MOSTLY, gain, leaves_more, much_is_left, soaked
-from armloop.diagnosis.search import ROUNDS, Found, Outcome, clear, pruned
-from armloop.diagnosis.trials import Hypotheses, Known
+from armloop.diagnosis.judgement import MOSTLY, much_is_left
+from armloop.diagnosis.search import ROUNDS
+from armloop.diagnosis.trials import Known
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
 from armloop.laws.effects.payload import Payload
-from armloop.model import AddedEffect
 from armloop.regression.embedded import ITERATIONS, solve
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array, Index, Mask, stretches
@@ -52,35 +57,32 @@ def account_with_load(
     if found is None:
         return None
     load, unknown = found
-    plain = _known_part(whole, unknown)
+    plain = known_part(whole, unknown)
     known = Known.of(plain, [load], [_shape(load)])
     if not load.plausible(whole.model.arm, known.fit.parameters[0]):
         return None
     # beside what was found it must explain most of what that leaves; only then is all else searched anew
-    if not _explains_most(float(_with(plain, load, account).fit.score.excess.sum()), account, plain.rows):
+    if not _explains_most(
+        float(with_account(plain, load, _shape(load), account).fit.score.excess.sum()), account, plain.rows
+    ):
         return None
-    other = _beside(whole, known, unknown, progress, jobs)
+    other = account_beside(whole, known, unknown, progress, jobs)
     for _ in range(ROUNDS):
         # what was found beside the load had a part in it, and in when it seems to be there: both are found anew
         before = {effect.place for effect in other.outcome.after.effects}
-        others = _with(plain.only(other.evidence.rows), load, other).fit.added()[1:]
-        found = find_carried(without(_by(whole, others), [])) if others else None
+        others = with_account(plain.only(other.evidence.rows), load, _shape(load), other).fit.added()[1:]
+        found = find_carried(without(known_by(whole, others), [])) if others else None
         if found is None:
             break
         load, unknown = found
-        plain = _known_part(whole, unknown)
-        other = _beside(whole, _with(plain, load, other), unknown, progress, jobs)
+        plain = known_part(whole, unknown)
+        other = account_beside(whole, with_account(plain, load, _shape(load), other), unknown, progress, jobs)
         if before == {effect.place for effect in other.outcome.after.effects}:
             break
     if not _explains_most(_excess(other, other.whole.rows), account, other.whole.rows):
         return None
-    loaded = _loaded(whole, load, other)
-    return None if _at_the_cost_of_others(account, loaded) else loaded
-
-
-def _known_part(whole: Evidence, unknown: Mask) -> Evidence:
-    """The run without known events, and without samples (N, n) of which nothing is to be said."""
-    return without(whole.only(whole.rows & ~unknown), [])
+    loaded = merged(whole, load, _shape(load), other)
+    return None if at_the_cost_of_others(account, loaded) else loaded
 
 
 def _excess(account: Account, rows: Mask) -> float:
@@ -94,50 +96,9 @@ def _explains_most(left: float, account: Account, rows: Mask) -> bool:
     return before > 0 and left <= (1 - MOSTLY) * before
 
 
-def _loaded(whole: Evidence, load: CarriedLoad, other: Account) -> Account:
-    """The account by the model as it is of one by a model that has the load: that is among the effects found."""
-    evidence = whole.only(other.evidence.rows)
-    nothing, alone = (Known.of(evidence, *given).fit for given in ((), ([load], [_shape(load)])))
-    bare = nothing.score
-    share = gain(bare, alone.score) / max(float(bare.excess.sum()), 1e-9)
-    every = [Found(load, _shape(load), min(share, 1.0)), *other.outcome.found]
-    together = Outcome(every, nothing, _with(evidence, load, other).fit)
-    run = replace(whole, rows=other.whole.rows, unknown=other.whole.unknown)
-    return replace(other, whole=run, evidence=evidence, outcome=clear(evidence, pruned(evidence, together)))
-
-
-def _at_the_cost_of_others(account: Account, loaded: Account) -> bool:
-    """Whether an account with a load surely leaves more of some joints than that without: it is but like what is there."""
-    common = account.evidence.rows & loaded.evidence.rows
-    bare, plain = Known.of(loaded.whole.only(common)).fit.score, account.score(common)
-    return leaves_more(loaded.score(common), plain, soaked(bare, plain))
-
-
-def _with(evidence: Evidence, load: CarriedLoad, account: Account) -> Known:
-    """The load and what an account has found, fitted together."""
-    after = account.outcome.after
-    return Known.of(evidence, [load, *after.effects], [_shape(load), *after.shapes])
-
-
 def _shape(load: CarriedLoad) -> Shape:
     """No parameter of the load, but a number that tells the columns of other intervals apart."""
     return Shape.fixed(float(hash(load.intervals) % 2**52))
-
-
-def _by(whole: Evidence, added: list[AddedEffect]) -> Evidence:
-    """The run as a model sees it that has some effects."""
-    return Evidence.of(whole.model.with_effects(added), whole.samples, list(whole.asked))
-
-
-def _beside(whole: Evidence, known: Known, unknown: Mask, progress: Progress, jobs: int | None) -> Account:
-    """The account of a run by a model that has the load, the first of what is known."""
-    again = _by(whole, known.fit.added()[:1])
-    if again.unknown is not None:
-        unknown = unknown | again.unknown
-    again = replace(again, rows=again.rows & ~unknown, unknown=unknown)
-    with Hypotheses(again, jobs) as panel:
-        contacts = find_contacts(again, again.residual([]))
-        return best_account(again, contacts, progress, panel)
 
 
 def _is_asked(account: Account) -> bool:

@@ -19,6 +19,7 @@ from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, w
 from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
+from armloop.diagnosis.onset import account_with_onset
 from armloop.diagnosis.reasons import Standing, event_in_doubt, event_untold, in_doubt, standing, too_still
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.score import mean_by_joint, ratio
@@ -157,9 +158,11 @@ class Diagnosis:
         effects: list[dict[str, Any]] = []
         every = zip(self.outcome.found, self.outcome.added(), self.strengths, strict=True)
         for found, added, strength in every:
+            onset = added.effect.onset
             effects.append(
                 {
                     **added.to_dict(),
+                    **({} if onset is None else {onset.word: onset.to_dict()}),
                     "share": found.share,
                     "when": "event" if added.effect.event else "always" if found.always else "changed",
                     "probability": probability.of_effect(found.share, strength.times)
@@ -167,9 +170,9 @@ class Diagnosis:
                     else None,
                     "strength": strength.to_dict(),
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
-                    "words": added.effect.sentence(added.parameters),
+                    "words": added.sentence(),
                     "sensor": added.effect.sensor,
-                    **({"remedy": added.effect.remedy(added.parameters)} if added.effect.sensor else {}),
+                    **({"remedy": added.remedy()} if added.effect.sensor else {}),
                     "alternatives": _alternatives(added.effect, found.rivals),
                 }
             )
@@ -277,6 +280,7 @@ def diagnose(
         with Hypotheses(whole, jobs) as panel:
             account = best_account(whole, contacts, progress, panel)
         account = account_with_load(whole, account, progress, jobs) or account
+        account = account_with_onset(account, logs, progress, jobs) or account
         found = _concluded(whole, account, progress)
     stand = replace(found.standing, reasons=[*found.reasons, *own_zeros])
     return replace(found, standing=stand, zeros=zeros)

@@ -23,6 +23,7 @@ from armloop.identification.uncertainty import friction_spread, torque_errors
 from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.base import Place
 from armloop.laws.effects.found import FAR
+from armloop.laws.effects.onset import Onset
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Index, Mask, stretches
 from armloop.util.interpolation import cubic_nodes
@@ -46,18 +47,22 @@ _HARMONICS = 15.0
 _KEPT = 1 << 28
 
 
-class _Columns(dict[tuple[Place, float], Array]):
+#: What tells the columns of one effect from those of another.
+_Key = tuple[Place, Onset | None]
+
+
+class _Columns(dict[tuple[_Key, float], Array]):
     """Columns by the effect's place and shape, as many as there is room for."""
 
     size = 0
 
-    def of(self, place: Place, shape: float, make: Callable[[], Array]) -> Array:
+    def of(self, key: _Key, shape: float, make: Callable[[], Array]) -> Array:
         """Columns as they were made before, if they were; else they are made, and kept while there is room."""
-        if (place, shape) in self:
-            return self[place, shape]
+        if (key, shape) in self:
+            return self[key, shape]
         columns = make()
         if self.size < _KEPT:
-            self[place, shape] = columns
+            self[key, shape] = columns
             self.size += columns.nbytes
         return columns
 
@@ -176,7 +181,7 @@ class Evidence:
     def _model_errors(self) -> Array:
         """(R, r) torque of the model's own errors at the rows that count, weighted."""
         errors = self._of_motion.of(
-            ("the model's own errors", None, None),
+            (("the model's own errors", None, None), None),
             0.0,
             lambda: torque_errors(self.model, self.samples)[self.independent],
         )
@@ -212,11 +217,14 @@ class Evidence:
 
     def _smoothed_at(self, effect: Effect, shape: float) -> Array:
         kept = self._of_model if effect.needs_model else self._of_motion
-        return kept.of(
-            effect.place,
-            shape,
-            lambda: smooth(self.samples, effect.columns(self.context, shape))[self.independent],
-        )
+
+        def made() -> Array:
+            columns = effect.columns(self.context, shape)
+            if effect.onset is not None:
+                columns = (columns.T * effect.onset.there(self.samples.motion)).T
+            return smooth(self.samples, columns)[self.independent]
+
+        return kept.of((effect.place, effect.onset), shape, made)
 
     def columns(self, effect: Effect, shape: float) -> Array:
         """(K, n, p) columns of an effect through the run's filter, at the samples kept."""

@@ -8,6 +8,7 @@ from typing import Any
 
 from armloop.laws.effects import Context, Effect, Estimate, Value, effect
 from armloop.laws.effects.base import Placed, Pointwise, entry
+from armloop.laws.effects.onset import Onset
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 
@@ -25,7 +26,8 @@ class AddedEffect:
 
     def torque(self, context: Context) -> Array:
         """(N, n) torque of the effect."""
-        return self.effect.torque(context, self.values)
+        torque, onset = self.effect.torque(context, self.values), self.effect.onset
+        return torque if onset is None else torque * onset.there(context.motion)[:, None]
 
     def pointwise(self, arm: Arm, inertial: Array | None) -> Pointwise:
         """The effect's torque for one sample at a time."""
@@ -40,19 +42,34 @@ class AddedEffect:
         """The parameters without their errors."""
         return {key: e.value for key, e in self.parameters.items()}
 
+    def sentence(self) -> str:
+        """What was found, in words, and since when, where it began within a run."""
+        onset = self.effect.onset
+        return self.effect.sentence(self.parameters) + ("" if onset is None else f", {onset.words()}")
+
+    def remedy(self) -> str:
+        """What the arm's owner should do, in words, and of which record; empty for what acts on the arm itself."""
+        words, onset = self.effect.remedy(self.parameters), self.effect.onset
+        return f"{words}. This goes for what was recorded {onset.words()}" if words and onset else words
+
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values, as in ``diagnosis.json``."""
         return {
             **entry(*self.effect.place),
             "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
             **({"when": self.when} if self.when else {}),
+            **({} if self.effect.onset is None else {self.effect.onset.word: self.effect.onset.to_model()}),
         }
 
     @staticmethod
     def from_dict(data: dict[str, Any]) -> AddedEffect:
         """Rebuild from :meth:`to_dict`."""
+        kind = effect(data["effect"], data["joint"], data.get("other_joint"))
+        for word in ("since", "until"):
+            if word in data:
+                kind = kind.within(Onset.from_model(data[word], word == "until"))
         return AddedEffect(
-            effect(data["effect"], data["joint"], data.get("other_joint")),
+            kind,
             {
                 key: Estimate(e["value"], _error(e["std_error"]), str(e["unit"]))
                 for key, e in data["parameters"].items()

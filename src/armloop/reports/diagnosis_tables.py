@@ -35,6 +35,9 @@ def effects_table(diagnosis: Diagnosis) -> Table:
             share, likely = (percent(found.share), percent(chance)) if k == 0 else ("", "")
             value = with_error(e.value, e.std_error)
             rows.append([label, key.replace("_", " "), value, unit(e.unit), share, likely, where])
+        onset = found.effect.onset
+        if onset is not None:
+            rows.append(["", onset.word, with_error(onset.time, onset.error), "s", "", "", ""])
     if diagnosis.unlisted is not None:
         label = f"unlisted, joint {diagnosis.unlisted.joint}"
         terms = [(k, e) for k, e in diagnosis.unlisted.parameters.items() if k not in RANGE]

@@ -32,7 +32,7 @@ def findings(diagnosis: Diagnosis) -> list[str]:
     turned = [] if diagnosis.reversals is None else diagnosis.reversals.found
     values: dict[str, object] = {
         "effects": [
-            (unit(added.effect.sentence(added.parameters)), found, found in turned)
+            (unit(added.sentence()), found, found in turned)
             for found, added in zip(outcome.found, outcome.added(), strict=True)
         ],
         "contacts": diagnosis.contacts,
@@ -83,7 +83,7 @@ def blame(diagnosis: Diagnosis) -> list[str]:
         who=who[:1].upper() + who[1:],
         what="recording" if all(isinstance(a.effect, TimeDelay) for a in faulty) else "sensor",
         arm=[effect_label(a.effect) for a in added if not a.effect.sensor],
-        remedies=[a.effect.remedy(a.parameters) for a in faulty],
+        remedies=[a.remedy() for a in faulty],
     )
     return say.paragraphs("blame")
 

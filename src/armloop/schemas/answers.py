@@ -9,6 +9,7 @@ from msgspec import UNSET, Meta, Struct, UnsetType
 from armloop.schemas.types import (
     Count,
     Finite,
+    Instant,
     JointNumber,
     Name,
     NotNegative,
@@ -28,8 +29,20 @@ class AlternativeData(Struct):
     why: Text = ""
 
 
+class OnsetData(Struct):
+    """The instant at which an effect begins to be there, or ceases to be, by the clock of its log."""
+
+    value: Instant
+    std_error: Seconds
+    unit: Literal["s"]
+    log: Name = ""
+
+
 class FoundData(Struct):
-    """An effect that was found, or the law of a residual that no listed effect explains."""
+    """An effect that was found, or the law of a residual that no listed effect explains.
+
+    One that is not there all the while has ``since``, from which instant on it is there, or ``until``.
+    """
 
     effect: Name
     joint: JointNumber | None
@@ -41,6 +54,8 @@ class FoundData(Struct):
     adopted: bool | UnsetType = UNSET
     when: Name | UnsetType = UNSET
     probability: Annotated[float, Meta(ge=0, le=1)] | UnsetType | None = UNSET
+    since: OnsetData | UnsetType = UNSET
+    until: OnsetData | UnsetType = UNSET
 
 
 class RemainsData(Struct):

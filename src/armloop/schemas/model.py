@@ -15,6 +15,7 @@ from armloop.schemas.types import (
     MOST_JOINTS,
     MOST_TERMS,
     Finite,
+    Instant,
     JointNumber,
     Matrix3,
     Name,
@@ -113,13 +114,26 @@ class EstimateData(Struct):
     unit: Name
 
 
+class OnsetOfLogData(Struct):
+    """The instant of one log at which an effect begins to be there, or ceases to be; ``posture`` tells which log."""
+
+    value: Instant
+    std_error: Seconds
+    posture: PerJoint
+    unit: Literal["s"] = "s"
+    log: Name = ""
+    elsewhere: bool = False
+
+
 class EffectData(Struct):
-    """An effect that was added, on a joint, a pair, or none."""
+    """An effect that was added, on a joint, a pair, or none; ``since`` or ``until`` an instant if it is not always there."""
 
     effect: Name
     joint: JointNumber | None
     parameters: Annotated[dict[Name, EstimateData], Meta(max_length=64)]
     other_joint: JointNumber | None = None
+    since: OnsetOfLogData | UnsetType = UNSET
+    until: OnsetOfLogData | UnsetType = UNSET
 
 
 class ConditioningData(Struct, forbid_unknown_fields=True):
@@ -354,6 +368,11 @@ def _agree(model: ModelData) -> None:
                 "one before, up to the same length"
             )
     for k, effect in enumerate(model.effects):
+        for word, onset in (("since", effect.since), ("until", effect.until)):
+            if onset is not UNSET and len(onset.posture) != n:
+                raise ModelError(
+                    f"effects[{k + 1}].{word}.posture: {len(onset.posture)} joints, the arm has {n}"
+                )
         for joint_number in (effect.joint, effect.other_joint):
             if joint_number is not None and joint_number > n:
                 raise ModelError(

@@ -17,6 +17,7 @@ NotNegative = Annotated[float, Meta(ge=0.0, le=1e12)]
 Positive = Annotated[float, Meta(gt=0.0, le=1e12)]
 #: A length of time, s.
 Seconds = Annotated[float, Meta(ge=0.0, le=1e7, description="s")]
+Instant = Annotated[float, Meta(ge=-1e12, le=1e12, description="by the clock of its log, s")]
 Share = Annotated[float, Meta(ge=-1e3, le=1e3, description="part of an energy; 1 is all of it")]
 Count = Annotated[int, Meta(ge=0, le=10**12)]
 JointNumber = Annotated[int, Meta(ge=1, le=MOST_JOINTS, description="counted from 1, base to tip")]

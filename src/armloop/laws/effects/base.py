@@ -10,13 +10,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from armloop.data.motion import Motion
+from armloop.laws.effects.onset import Onset
 from armloop.laws.friction import Acting, Direction
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import inverse_dynamics
@@ -180,7 +182,8 @@ class Effect(ABC):
     needs_model: ClassVar[bool] = True
     mesh: ClassVar[float | None] = None
     load: ClassVar[bool] = False
-    event: ClassVar[bool] = False
+    event: bool = False
+    onset: Onset | None = None
     searched: ClassVar[bool] = True
     memory: ClassVar[bool] = False
     of_time: ClassVar[bool] = False
@@ -229,6 +232,17 @@ class Effect(ABC):
     def joints(self, parameters: Mapping[str, Any]) -> list[int]:
         """The joints, counted from 1, that its law with these parameters is of; none if it is of the whole arm."""
         return [index + 1 for index in self.indices]
+
+    def within(self, onset: Onset) -> Self:
+        """The same effect, there since an instant of a run, or until then: that was an event of it."""
+        part = copy(self)
+        part.onset, part.event = onset, self.event or onset.until
+        return part
+
+    @property
+    def linear(self) -> bool:
+        """Whether its coefficients are free, and none depends on another."""
+        return type(self).embed is Effect.embed
 
     @property
     def place(self) -> Place:

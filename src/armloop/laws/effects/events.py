@@ -9,10 +9,8 @@ import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.laws.effects.base import Estimate, Value, number
+from armloop.laws.effects.onset import passes
 from armloop.util.arrays import Array, Mask
-
-#: Two postures, rad or m, that are the same sample of the same log.
-_SAME = 1e-6
 
 
 def during(motion: Motion, parameters: dict[str, Value]) -> Mask:
@@ -26,12 +24,8 @@ def during(motion: Motion, parameters: dict[str, Value]) -> Mask:
     rows = np.zeros(motion.samples, dtype=bool)
     for run in motion.runs():
         time = motion.time[run]
-        if posture is not None:
-            if not time[0] - _SAME <= start <= time[-1] + _SAME:
-                continue
-            at = motion.q[run.start + int(np.argmin(np.abs(time - start)))]
-            if np.abs(at - np.asarray(posture, dtype=float)).max() > _SAME:
-                continue
+        if posture is not None and not passes(motion, run, start, np.asarray(posture, dtype=float)):
+            continue
         rows[run] = (time >= start) & (time <= end)
     return rows
 

@@ -1,0 +1,180 @@
+"""Accounts of a run in which an effect begins, or ends: all else found anew beside it, if that is likelier.
+
+What an effect within a run is judged against is all that was found without it: effects, laws and events, each at its price,
+and the same effect all the while. Friction that rises within a run is told as events, a drift or a law of no listed form
+else; a search beside it finds none of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armloop.data.log import MotionLog
+from armloop.diagnosis.account import Account
+from armloop.diagnosis.beside import account_beside, at_the_cost_of_others, known_part, merged
+from armloop.diagnosis.change_points import ChangePoints, Judged, Part, Shaped, price
+from armloop.diagnosis.contacts import without
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.judgement import enough, gain, is_worth
+from armloop.diagnosis.law_selection import library_of, names_of
+from armloop.diagnosis.search import ALTERNATIVE, ROUNDS, told
+from armloop.diagnosis.trials import Known
+from armloop.laws.effects import Effect, hypotheses
+from armloop.laws.effects.found import RANGE
+from armloop.laws.effects.onset import Onset
+from armloop.util.arrays import Array, Mask
+from armloop.util.progress import Progress
+
+#: So many effects, those with the likeliest profiles, are each fitted beside what was found.
+_TRIED = 4
+
+
+def account_with_onset(
+    account: Account, logs: Sequence[MotionLog], progress: Progress, jobs: int | None
+) -> Account | None:
+    """The account of a run in which an effect begins, or ends; None where what is there is there all the while.
+
+    Args:
+        account: that without.
+        logs: the run's, whose names are stated.
+    """
+    if not _is_asked(account):
+        return None
+    progress("whether what is there began, or ended, within the run")
+    whole, residual = account.whole, account.remaining()
+    points = ChangePoints(known_part(whole, np.zeros_like(whole.rows)))
+    tested = [judged for judged in _likeliest(points, account) if _is_told(points, judged, account, residual)]
+    best = max(tested, key=lambda judged: judged.likely, default=None)
+    if best is None:
+        return None
+    progress(f"{best.part.effect.label()} begins or ends within the run; searching beside it")
+    rivals = [one for one in tested if one is not best and one.likely >= best.likely + np.log(ALTERNATIVE)]
+    part, cut = best.part, best.cut
+    for _ in range(ROUNDS):
+        onset = replace(points.onset(part, cut), error=points.error(part, cut))
+        unknown = np.broadcast_to(points.near(onset)[:, None], whole.rows.shape)
+        known = part.fitted(known_part(whole, unknown), onset)
+        other = account_beside(whole, known, unknown, progress, jobs)
+        # what is found beside it had a part in when it seems to begin
+        after = other.outcome.after
+        part = replace(part, others=tuple(zip(after.effects, after.shapes, strict=True)))
+        points = ChangePoints(without(known_part(whole, np.zeros_like(unknown)), other.contacts))
+        again = points.best(part)
+        if again is None:
+            return None
+        cut, moved = again[1], abs(points.onset(part, again[1]).time - onset.time)
+        if moved <= max(onset.error, whole.samples.period):
+            break
+    onset = replace(onset, log=_name(logs, onset))
+    effect = part.effect.within(onset)
+    shares = [(one.part.effect, _share(one)) for one in rivals]
+    found = merged(whole, effect, part.shape, other, shares)
+    there = any(one.onset is not None for one in found.outcome.after.effects)
+    if not there or at_the_cost_of_others(account, found):
+        return None
+    rows = found.whole.rows & account.whole.rows
+    left = found.remaining()
+    return found if _posterior(found, left, rows) > _posterior(account, residual, rows) else None
+
+
+def _is_asked(account: Account) -> bool:
+    """Whether there was more than effects that are there all the while, or these leave more than a model's shortcomings."""
+    after = account.outcome.after
+    if account.contacts or account.unlisted is not None or any(e.of_time for e in after.effects):
+        return True
+    return bool((after.score.energy > enough(account.evidence, after.score)).any())
+
+
+def _likeliest(points: ChangePoints, account: Account) -> Iterator[Judged]:
+    """The effects with the likeliest profiles, each judged beside the others."""
+    found: dict[object, tuple[float, int, Part]] = {}
+    for effect, shape in _hypotheses(points.evidence, account):
+        for others in _beside(effect, account):
+            for part in points.parts(effect, shape, others):
+                best = points.best(part)
+                if best is not None and best[0] > found.get(effect.place, (-np.inf,))[0]:
+                    found[effect.place] = (*best, part)
+    for _, cut, part in sorted(found.values(), key=lambda one: -one[0])[:_TRIED]:
+        judged = points.judged(part, cut)
+        if judged is not None:
+            yield judged
+
+
+def _hypotheses(evidence: Evidence, account: Account) -> Iterator[Shaped]:
+    """Effects that may begin within a run: linear in their coefficients, with the nonlinear parameter found, or of none."""
+    after = account.outcome.after
+    known = {e.place: shape for e, shape in zip(after.effects, after.shapes, strict=True)}
+    for effect in hypotheses(evidence.model.arm):
+        if effect.of_time or not effect.linear or not all(evidence.rows[:, j].any() for j in effect.indices):
+            continue
+        if effect.place in known:
+            yield effect, known[effect.place]
+        elif len(tried := evidence.tried(effect)) == 1:
+            yield effect, Shape.fixed(tried[0])
+
+
+def _beside(effect: Effect, account: Account) -> list[tuple[Shaped, ...]]:
+    """What may be there beside an effect: what was found, but for what only a run that changes asks for, or less.
+
+    On the joints of the effect, what was found may be but the nearest names for it.
+    """
+    after = account.outcome.after
+    found = [pair for pair in zip(after.effects, after.shapes, strict=True) if not pair[0].of_time]
+    others = tuple(pair for pair in found if pair[0].place != effect.place)
+    apart = tuple(p for p in others if p[0].indices and not set(p[0].indices) & set(effect.indices))
+    return list(dict.fromkeys([others, apart, tuple(found)]))
+
+
+def _is_told(points: ChangePoints, judged: Judged, account: Account, residual: Array) -> bool:
+    """Whether an effect within the run is likelier than what was found without it, and surely more than all the while."""
+    evidence, part = judged.known.evidence, judged.part
+    rows, without_events = evidence.rows, evidence.rows & account.evidence.rows
+    likelier = judged.likely > _posterior(account, residual, rows)
+    if account.contacts and not likelier:
+        # beside an event that it does not explain, either
+        bare = replace(account, contacts=[])
+        likelier = judged.likely_of(without_events) > _posterior(bare, residual, without_events)
+    if not likelier:
+        return False
+    effects, shapes = zip(
+        *{e.place: (e, s) for e, s in ((part.effect, part.shape), *part.others)}.values(), strict=True
+    )
+    constant = Known.of(evidence, effects, shapes).fit.score
+    ties = 1 if part.effect.other_joint is None else 2
+    worth = is_worth(evidence, constant, judged.score(rows), ties, part.effect)
+    return worth and not points.of_motion(part, judged.cut)
+
+
+def _posterior(account: Account, residual: Array, rows: Mask) -> float:
+    """Log posterior of all that an account states, of some rows (N, n), but for a constant of the run."""
+    evidence = account.evidence
+    effects = [*account.outcome.after.effects, *(contact.added.effect for contact in account.contacts)]
+    value = told(account.everywhere(residual, rows)) + price(evidence, effects)
+    if account.unlisted is not None:
+        terms = len(account.unlisted.parameters.keys() - set(RANGE))
+        library = library_of(tuple(evidence.model.arm.revolute.tolist()))
+        value -= terms * float(np.log(len(names_of(library, account.unlisted.joint - 1))))
+    return value
+
+
+def _share(judged: Judged) -> float:
+    """The part of the explainable energy that an effect removes beside the others."""
+    evidence, part = judged.known.evidence, judged.part
+    bare = Known.of(evidence).fit.score
+    others = Known.of(evidence, *map(list, zip(*part.others, strict=True))).fit.score if part.others else bare
+    gained = gain(others, judged.score(evidence.rows))
+    return float(np.clip(gained / max(float(bare.excess.sum()), 1e-9), 0.0, 1.0))
+
+
+def _name(logs: Sequence[MotionLog], onset: Onset) -> str:
+    """The name of the log that an instant is of: the one that is nearest to its posture then."""
+    there = [log for log in logs if log.time[0] <= onset.time <= log.time[-1]]
+    away = [
+        float(np.abs(log.q[int(np.argmin(np.abs(log.time - onset.time)))] - onset.posture).max())
+        for log in there
+    ]
+    return there[int(np.argmin(away))].name if there else ""
