@@ -22,6 +22,7 @@ from armloop.data.redundancy import (
     unlike,
     windows_of,
 )
+from armloop.data.slips import slips
 from armloop.util.arrays import TINY, Array
 
 # No joint of an arm turns beyond, moves faster, accelerates harder or bears more (rad, rad/s, rad/s², N·m or A).
@@ -61,11 +62,16 @@ def faults(log: Recorded) -> Iterator[Finding]:
 
 
 def doubts(log: Recorded) -> Iterator[Finding]:
-    """Yield what may be right and should be known: spikes, a torque that is stuck or constant, v that lags, few samples."""
+    """Yield what may be right and should be known: spikes, a torque that is stuck or constant, an encoder that slips, v that
+    lags, few samples.
+    """
     if not is_time_series(log.q, log.runs):
         return
     yield from dropouts(log)
     yield from _constant_torques(log)
+    for slip in slips(log):
+        words = f"{slip.words(float(log.time[slip.row]))}; from there on its angle may be wrong"
+        yield Finding(f"column q{slip.joint + 1}", words, slip.row)
     if log.derived:
         yield Finding("columns v", "are missing; v is the derivative of q")
     else:
@@ -184,7 +190,8 @@ def _clock(log: Recorded) -> Iterator[Finding]:
 
 
 def _jumps(log: Recorded) -> Iterator[Finding]:
-    """Steps of q that the rates before and after do not explain: wrapped angles, runs joined without a gap."""
+    """Steps of q that the rates before and after do not explain: wrapped angles, encoders that slip, runs joined."""
+    slipped = {(slip.joint, slip.row): slip for slip in slips(log)}
     for run in log.runs:
         if run.stop - run.start < 5:
             continue
@@ -201,6 +208,15 @@ def _jumps(log: Recorded) -> Iterator[Finding]:
                 change = float(step[row + 1, j])
                 turns = abs(change) / (2 * np.pi)
                 wrapped = round(turns) >= 1 and abs(turns - round(turns)) < 0.02
+                slip = slipped.get((j, run.start + row + 2))
+                if slip is not None and not wrapped:
+                    words = slip.words(float(log.time[slip.row]))
+                    yield Finding(
+                        f"column q{j + 1}",
+                        f"{words}; correct q{j + 1} from there on, or cut the log there",
+                        slip.row,
+                    )
+                    continue
                 yield Finding(
                     f"column q{j + 1}",
                     f"jumps by {change:.4g} from the row before"
