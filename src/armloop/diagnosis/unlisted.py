@@ -178,9 +178,14 @@ def _is_simpler(evidence: Evidence, law: Law, outcome: Outcome, bare: Outcome, j
 
 
 def _leaves_far_less(law: Score, other: Score) -> bool:
-    """Whether a law leaves less than half of what the other leaves above the baseline, and surely."""
-    own = float(other.rows.sum())  # is left by either
-    return gain(other, law) >= max(MOSTLY * (other.error - own), own) and lead(other, law) > SIGNIFICANCE
+    """Whether a law leaves less than half of what the other leaves above the baseline, and surely.
+
+    What the model itself gets wrong either leaves. So of two that are not nested their difference tells, block by block,
+    and not how much that is (Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses", Econometrica
+    57, 1989).
+    """
+    above = float(other.excess.sum())
+    return above > 0 and gain(other, law) >= MOSTLY * above and lead(other, law) > SIGNIFICANCE
 
 
 def _with_listed(
