@@ -48,9 +48,9 @@ def read_header(path: Path) -> list[str]:
     """
     _check_suffix(path)
     if not path.exists():
-        raise LogError(f"{path}: no such file; give the path of a CSV or Parquet motion log")
+        raise LogError(f"{path}: no such file; give the path of a CSV or Parquet table")
     if not path.is_file():
-        raise LogError(f"{path}: not a file; give the path of a CSV or Parquet motion log")
+        raise LogError(f"{path}: not a file; give the path of a CSV or Parquet table")
     try:
         if path.stat().st_size == 0:
             raise LogError(f"{path}: the file is empty; {_FIRST[kind_of(path)]}")
