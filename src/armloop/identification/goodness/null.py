@@ -70,7 +70,7 @@ def empirical_null(
             continue
         together = smooth(samples, np.concatenate(shapes, axis=-1))
         # of the other joints, columns on the effect's own remove nothing
-        joints = [effect.index] if together.ndim == 2 else list(range(model.arm.n))
+        joints = np.array([effect.index]) if together.ndim == 2 else np.arange(model.arm.n)
         together = together.reshape(len(together), len(joints), -1)
         best = np.zeros((len(own), model.arm.n))
         for k, rows in enumerate(own):
