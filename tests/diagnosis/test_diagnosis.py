@@ -166,6 +166,7 @@ def test_a_push_is_found_with_its_interval_and_force_and_spoils_nothing_else(
     with_drag, alone = (replace(diagnosis.model, effects=own) for own in ((drag,), (event,)))
     np.testing.assert_allclose(diagnosis.model.feedforward(q, v, vdot), with_drag.feedforward(q, v, vdot))
     np.testing.assert_allclose(alone.feedforward(q, v, vdot), model.feedforward(q, v, vdot))
+    assert diagnosis.model.of_the_drives().effects == (drag,)
 
 
 def check_errors(error: dict, joint: int | None, within: float = 1.6) -> None:
