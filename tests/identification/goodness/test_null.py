@@ -115,6 +115,16 @@ def test_of_a_joint_that_moves_in_too_few_stretches_nothing_is_known() -> None:
     assert {law["joint"] for law in found if law["effect"] == "coulomb_friction"} == {2, 3}
 
 
+def test_of_a_law_of_one_joint_the_samples_count_in_which_that_joint_moves() -> None:
+    given = samples([0.3, -0.3, 0.6, 0.2], noise=0.02)
+    moving = given.moving.copy()
+    moving[:, 0] &= np.random.default_rng(1).random(len(moving)) < 0.5
+    every, half = (
+        removed(null_of(replace(given, moving=of)), "coulomb_friction", 2) for of in (given.moving, moving)
+    )
+    np.testing.assert_allclose(half[1], every[1], rtol=1e-9)
+
+
 def test_of_a_law_whose_columns_are_nothing_in_too_few_stretches_nothing_is_known(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
