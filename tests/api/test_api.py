@@ -36,7 +36,7 @@ def run(seconds: float, seed: int, offset: float = 0.0) -> MotionLog:
 @pytest.fixture(scope="module")
 def model() -> "al.Model":
     return al.reconstruct(
-        [run(40, 1), run(40, 2)],
+        [run(25, 1), run(25, 2)],
         three_axis(),
         library="rigid-body",
         friction=["coulomb", "viscous", "stribeck"],
@@ -45,7 +45,7 @@ def model() -> "al.Model":
 
 @pytest.fixture(scope="module")
 def found(model) -> "al.Diagnosis":
-    return al.diagnose(model, run(40, 3, offset=0.8))
+    return al.diagnose(model, run(25, 3, offset=0.8))
 
 
 def test_every_public_name_loads_says_what_it_is_and_stands_in_the_documents(repository):
