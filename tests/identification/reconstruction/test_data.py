@@ -25,8 +25,9 @@ from armloop.identification.reconstruction.sums import Usable
 from armloop.regression.sparse import Sparse
 from armloop.util.workers import Processes, Serial, Workers
 
-#: Terms chosen by least squares, as by default, but faster: what is asked is where the samples come from.
-OPTIONS = Options(max_order=1, sparse=Sparse("thresholded"))
+#: Terms chosen by least squares, as by default, but faster: what is asked is where the samples come from. Standard errors
+#: are compared to the bit below, and the parts in `tests/identification/goodness`.
+OPTIONS = Options(max_order=1, sparse=Sparse("thresholded"), parts=False, standard_errors=False)
 
 
 def a_run(seed: int, seconds: float = 10.0, rate: float = 125.0) -> MotionLog:
@@ -218,7 +219,7 @@ def test_the_reference_meets_every_fold_and_a_chunk_may_lack_a_condition(
     data = Data.streamed(logs, Conditioning(cutoff_hz=0), OPTIONS)
     assert 0.15 < data.reference.held_out.mean() < 0.25
     assert 0.15 < data.reference.validation.mean() < 0.25
-    options = Options(max_order=2)
+    options = Options(max_order=2, parts=False, standard_errors=False)
     how = Conditioning(cutoff_hz=0)
     streamed = reconstruct(logs, three_axis(), conditioning=how, options=options, in_memory=0)
     assert streamed.reports[0].orders == [2, 0] and streamed.reports[0].terms == [0, 2, 1]
