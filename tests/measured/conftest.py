@@ -1,8 +1,12 @@
 """The UR10e's logs, and a model of the arm without load that several tests look at."""
 
+import contextlib
 import fcntl
+import io
+import json
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,7 +36,15 @@ def model(ur10e: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with (place / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not path.exists():
-            assert (
-                main(["reconstruct", *logs, *arm, "--drive-gains", GAINS, "--out", str(path), "--json"]) == 0
-            )
+            with contextlib.redirect_stdout(io.StringIO()) as printed:
+                call = ["reconstruct", *logs, *arm, "--drive-gains", GAINS, "--out", str(path), "--json"]
+                assert main(call) == 0
+            path.with_name("answer.json").write_text(printed.getvalue())
     return path
+
+
+@pytest.fixture(scope="session")
+def answer_of_model(model: Path) -> dict[str, Any]:
+    """What the command that made it said."""
+    found: dict[str, Any] = json.loads(model.with_name("answer.json").read_text())
+    return found
