@@ -61,7 +61,7 @@ def result(logs: list[MotionLog]) -> Reconstruction:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(room, "_orders", lambda revolute, parts, second, options: ((1, second[-1]),))
-        return reconstruct(logs, three_axis(), options=OPTIONS)
+        return reconstruct(logs, three_axis(), options=PLAIN)
 
 
 def entry(
