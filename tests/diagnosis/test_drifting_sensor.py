@@ -52,7 +52,7 @@ def test_a_constant_and_a_short_log_hold_no_drift(model: ReconstructedModel) -> 
     drift = effect("torque_drift", 2)
     fits = [drift.resolved({"time_constant": Estimate(T, 0.0, "s")}, [4.0, 600.0]) for T in (3.9, 4.0, 900.0)]
     assert fits == [False, True, True]
-    short = diagnose(model, [run(3, 30.0)], jobs=1).samples.motion
+    short = preprocess([run(3, 30.0)], model.conditioning).motion
     context = replace(model.context(short), motion=short.take(slice(0, 200)))
     assert effect("torque_drift", 2).shapes(context) == []
 

@@ -38,7 +38,8 @@ def test_a_comparison_says_that_its_loop_is_not_stable(tmp_path: Path) -> None:
     )
 
 
-def test_a_tuning_states_no_margin_of_it(tmp_path: Path) -> None:
+def test_a_tuning_states_no_margin_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armloop.workflows.tuning.propose_gains", lambda *_: PidGains.paper(3))
     _, tuning = tune_scenario(wild(), 2 * np.pi * 5, 60.0, None, tmp_path, silent)
     present = answered((tmp_path / "tune.json").read_text(), "tune")["present"]
     assert present["stable"] is False and present["step_deviation"] == [None] * 3
