@@ -297,7 +297,7 @@ def test_a_load_at_the_cost_of_other_joints_is_none(
         return True
 
     assert with_load is not None
-    monkeypatch.setattr(carrying, "leaves_more", leaves_more)
+    monkeypatch.setattr("armloop.diagnosis.beside.leaves_more", leaves_more)
     assert account_with_load(whole, account, silent, 1) is None
     ((loaded, plain, least),) = asked
     np.testing.assert_array_equal(loaded.rows, plain.rows)

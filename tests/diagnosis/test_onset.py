@@ -175,6 +175,21 @@ def test_an_effect_of_faster_motion_is_no_onset(model: ReconstructedModel) -> No
     assert answers == [True, False]
 
 
+def test_what_grows_all_along_has_no_instant(model: ReconstructedModel) -> None:
+    """A belt that creeps is no belt that slips, though a step comes nearer to it than a constant."""
+    answers = []
+    for seed in (1, 2, 3):
+        log = run(seed, 30.0)
+        course = np.outer(log.time / 30.0, [0.0, 0.03, 0.0])
+        for points in (
+            points_of(model, replace(log, q=log.q + course)),
+            points_of(model, slipped(seed, 15.0, 0.03)),
+        ):
+            part = part_of(points, "encoder_offset")[0]
+            answers.append(points.gradual(part, points.best(part)[1]))
+    assert answers == [True, False] * 3
+
+
 def test_of_several_logs_the_one_that_it_begins_in_is_found(model: ReconstructedModel) -> None:
     """Their clocks pass the same times: nothing tells which was recorded first, and each may have it or not."""
     first, then = run(6, 20.0), log_of(7, lambda m: rubs_more(m, 9.0), 20.0)

@@ -1,7 +1,7 @@
-"""Accounts of a run beside one effect that is given, with the times at which it is there: all else is searched anew.
+"""Accounts of a run beside effects that are given, with the times at which they are there: all else is searched anew.
 
 What comes and goes within a run is no hypothesis of the search, for when it does is found first. The search is made by a
-model that has the effect, and then both are fitted together.
+model that has the effects, and then all are fitted together.
 """
 
 from __future__ import annotations
@@ -12,11 +12,9 @@ from dataclasses import replace
 from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.contacts import find_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import gain, leaves_more, soaked
 from armloop.diagnosis.search import Found, Outcome, clear, pruned
 from armloop.diagnosis.trials import Hypotheses, Known
-from armloop.laws.effects import Effect
 from armloop.model import AddedEffect
 from armloop.util.arrays import Mask
 from armloop.util.progress import Progress
@@ -32,17 +30,18 @@ def known_by(whole: Evidence, added: list[AddedEffect]) -> Evidence:
     return Evidence.of(whole.model.with_effects(added), whole.samples, list(whole.asked))
 
 
-def with_account(evidence: Evidence, given: Effect, shape: Shape, account: Account) -> Known:
-    """The given effect and what an account has found, fitted together."""
+def with_account(evidence: Evidence, given: Sequence[Found], account: Account) -> Known:
+    """The given effects and what an account has found, fitted together."""
     after = account.outcome.after
-    return Known.of(evidence, [given, *after.effects], [shape, *after.shapes])
+    effects, shapes = [f.effect for f in given], [f.shape for f in given]
+    return Known.of(evidence, [*effects, *after.effects], [*shapes, *after.shapes])
 
 
 def account_beside(
-    whole: Evidence, known: Known, unknown: Mask, progress: Progress, jobs: int | None
+    whole: Evidence, known: Known, unknown: Mask, progress: Progress, jobs: int | None, given: int = 1
 ) -> Account:
-    """The account of a run by a model that has the given effect, the first of what is known."""
-    again = known_by(whole, known.fit.added()[:1])
+    """The account of a run by a model that has the given effects, so many, the first of what is known."""
+    again = known_by(whole, known.fit.added()[:given])
     if again.unknown is not None:
         unknown = unknown | again.unknown
     again = replace(again, rows=again.rows & ~unknown, unknown=unknown)
@@ -51,20 +50,17 @@ def account_beside(
         return best_account(again, contacts, progress, panel)
 
 
-def merged(
-    whole: Evidence,
-    given: Effect,
-    shape: Shape,
-    other: Account,
-    rivals: Sequence[tuple[Effect, float]] = (),
-) -> Account:
-    """The account by the model as it is of one by a model that has the given effect: that is among the effects found."""
-    evidence = whole.only(other.evidence.rows)
-    nothing, alone = (Known.of(evidence, *each).fit for each in ((), ([given], [shape])))
+def merged(whole: Evidence, given: Sequence[Found], other: Account) -> Account:
+    """The account by the model as it is of one by a model that has the given effects: these are among those found.
+
+    The share of the first is that which it removes by itself.
+    """
+    evidence, first = whole.only(other.evidence.rows), given[0]
+    nothing, alone = (Known.of(evidence, *each).fit for each in ((), ([first.effect], [first.shape])))
     bare = nothing.score
     share = gain(bare, alone.score) / max(float(bare.excess.sum()), 1e-9)
-    every = [Found(given, shape, min(share, 1.0), list(rivals)), *other.outcome.found]
-    together = Outcome(every, nothing, with_account(evidence, given, shape, other).fit)
+    every = [replace(first, share=min(share, 1.0)), *given[1:], *other.outcome.found]
+    together = Outcome(every, nothing, with_account(evidence, given, other).fit)
     run = replace(whole, rows=other.whole.rows, unknown=other.whole.unknown)
     return replace(other, whole=run, evidence=evidence, outcome=clear(evidence, pruned(evidence, together)))
 

@@ -25,7 +25,7 @@ from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import MOSTLY, much_is_left
-from armloop.diagnosis.search import ROUNDS
+from armloop.diagnosis.search import ROUNDS, Found
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
 from armloop.laws.effects.payload import Payload
@@ -63,25 +63,25 @@ def account_with_load(
         return None
     # beside what was found it must explain most of what that leaves; only then is all else searched anew
     if not _explains_most(
-        float(with_account(plain, load, _shape(load), account).fit.score.excess.sum()), account, plain.rows
+        float(with_account(plain, [_found(load)], account).fit.score.excess.sum()), account, plain.rows
     ):
         return None
     other = account_beside(whole, known, unknown, progress, jobs)
     for _ in range(ROUNDS):
         # what was found beside the load had a part in it, and in when it seems to be there: both are found anew
         before = {effect.place for effect in other.outcome.after.effects}
-        others = with_account(plain.only(other.evidence.rows), load, _shape(load), other).fit.added()[1:]
+        others = with_account(plain.only(other.evidence.rows), [_found(load)], other).fit.added()[1:]
         found = find_carried(without(known_by(whole, others), [])) if others else None
         if found is None:
             break
         load, unknown = found
         plain = known_part(whole, unknown)
-        other = account_beside(whole, with_account(plain, load, _shape(load), other), unknown, progress, jobs)
+        other = account_beside(whole, with_account(plain, [_found(load)], other), unknown, progress, jobs)
         if before == {effect.place for effect in other.outcome.after.effects}:
             break
     if not _explains_most(_excess(other, other.whole.rows), account, other.whole.rows):
         return None
-    loaded = merged(whole, load, _shape(load), other)
+    loaded = merged(whole, [_found(load)], other)
     return None if at_the_cost_of_others(account, loaded) else loaded
 
 
@@ -99,6 +99,11 @@ def _explains_most(left: float, account: Account, rows: Mask) -> bool:
 def _shape(load: CarriedLoad) -> Shape:
     """No parameter of the load, but a number that tells the columns of other intervals apart."""
     return Shape.fixed(float(hash(load.intervals) % 2**52))
+
+
+def _found(load: CarriedLoad) -> Found:
+    """The load as an effect that was found; its share is not known yet."""
+    return Found(load, _shape(load), 0.0)
 
 
 def _is_asked(account: Account) -> bool:

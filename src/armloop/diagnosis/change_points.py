@@ -187,6 +187,18 @@ class ChangePoints:
         high = cuts[min([len(cuts) - 1, *beyond[beyond > at]])]
         return float(time[high] - time[low]) / 2
 
+    def gradual(self, part: Part, cut: int) -> bool:
+        """Whether an effect that grows, or wanes, all along does as well as one that steps: then it has no instant."""
+        gates, order, fixed = self._gates(part), self._order(part), self._fixed(part)
+        time = self._motion.time[self._kept[order]]
+        course = np.zeros((len(fixed), 2))
+        course[fixed, 0] = course[order, 0] = 1.0
+        course[order, 1] = (time - time[0]) / max(float(time[-1] - time[0]), TINY)
+        columns = [gates.gated * along[:, None, None] for along in course.T]
+        steady = Gates(np.concatenate(columns, axis=2), gates.beside, gates.y).residual(np.ones_like(fixed))
+        step = gates.residual(self._there(part, cut))
+        return lead(self._score(steady), self._score(step)) <= SIGNIFICANCE
+
     def of_motion(self, part: Part, cut: int) -> bool:
         """Whether the effect is as well there from a speed or a posture on, of this or of any joint.
 
@@ -246,9 +258,8 @@ class ChangePoints:
         return cuts[(before[cuts] >= _BLOCKS) & (before[-1] - before[cuts] >= _BLOCKS)]
 
     def _gates(self, part: Part) -> Gates:
-        key = tuple(
-            (effect.place, shape.final) for effect, shape in ((part.effect, part.shape), *part.others)
-        )
+        every = ((part.effect, part.shape), *part.others)
+        key = tuple((effect.place, effect.onset, shape.final) for effect, shape in every)
         if key not in self._made:
             n = self._weight.shape[1]
             beside = [self._columns(*other) for other in part.others]

@@ -19,7 +19,7 @@ from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, w
 from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
-from armloop.diagnosis.onset import account_with_onset
+from armloop.diagnosis.onset import account_with_onsets
 from armloop.diagnosis.reasons import Standing, event_in_doubt, event_untold, in_doubt, standing, too_still
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.score import mean_by_joint, ratio
@@ -280,7 +280,7 @@ def diagnose(
         with Hypotheses(whole, jobs) as panel:
             account = best_account(whole, contacts, progress, panel)
         account = account_with_load(whole, account, progress, jobs) or account
-        account = account_with_onset(account, logs, progress, jobs) or account
+        account = account_with_onsets(account, logs, progress, jobs)
         found = _concluded(whole, account, progress)
     stand = replace(found.standing, reasons=[*found.reasons, *own_zeros])
     return replace(found, standing=stand, zeros=zeros)

@@ -21,7 +21,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import enough, gain, is_worth
 from armloop.diagnosis.law_selection import library_of, names_of
-from armloop.diagnosis.search import ALTERNATIVE, ROUNDS, told
+from armloop.diagnosis.search import ALTERNATIVE, MOST_EFFECTS, ROUNDS, Found, told
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.found import RANGE
@@ -33,15 +33,27 @@ from armloop.util.progress import Progress
 _TRIED = 4
 
 
-def account_with_onset(
+def account_with_onsets(
     account: Account, logs: Sequence[MotionLog], progress: Progress, jobs: int | None
-) -> Account | None:
-    """The account of a run in which an effect begins, or ends; None where what is there is there all the while.
+) -> Account:
+    """The account of a run in which effects begin, or end, one after the other; as it is where all is there all the while.
 
     Args:
         account: that without.
         logs: the run's, whose names are stated.
     """
+    for _ in range(MOST_EFFECTS):
+        more = _with_one_more(account, logs, progress, jobs)
+        if more is None:
+            break
+        account = more
+    return account
+
+
+def _with_one_more(
+    account: Account, logs: Sequence[MotionLog], progress: Progress, jobs: int | None
+) -> Account | None:
+    """The account in which one more effect begins, or ends; None where none does."""
     if not _is_asked(account):
         return None
     progress("whether what is there began, or ended, within the run")
@@ -52,16 +64,21 @@ def account_with_onset(
     if best is None:
         return None
     progress(f"{best.part.effect.label()} begins or ends within the run; searching beside it")
-    rivals = [one for one in tested if one is not best and one.likely >= best.likely + np.log(ALTERNATIVE)]
-    part, cut = best.part, best.cut
+    # what is there at times is no hypothesis of a search
+    earlier = [f for f in account.outcome.found if f.effect.onset is not None or f.effect.event]
+    known_before = tuple((f.effect, f.shape) for f in earlier)
+    rest = tuple(pair for pair in best.part.others if pair not in known_before)
+    part, cut = replace(best.part, others=(*known_before, *rest)), best.cut
     for _ in range(ROUNDS):
         onset = replace(points.onset(part, cut), error=points.error(part, cut))
-        unknown = np.broadcast_to(points.near(onset)[:, None], whole.rows.shape)
+        near = [points.near(each) for each in (onset, *(f.effect.onset for f in earlier if f.effect.onset))]
+        unknown = np.broadcast_to(np.logical_or.reduce(near)[:, None], whole.rows.shape)
         known = part.fitted(known_part(whole, unknown), onset)
-        other = account_beside(whole, known, unknown, progress, jobs)
+        other = account_beside(whole, known, unknown, progress, jobs, given=1 + len(earlier))
         # what is found beside it had a part in when it seems to begin
         after = other.outcome.after
-        part = replace(part, others=tuple(zip(after.effects, after.shapes, strict=True)))
+        found = tuple(zip(after.effects, after.shapes, strict=True))
+        part = replace(part, others=(*known_before, *found))
         points = ChangePoints(without(known_part(whole, np.zeros_like(unknown)), other.contacts))
         again = points.best(part)
         if again is None:
@@ -69,16 +86,15 @@ def account_with_onset(
         cut, moved = again[1], abs(points.onset(part, again[1]).time - onset.time)
         if moved <= max(onset.error, whole.samples.period):
             break
-    onset = replace(onset, log=_name(logs, onset))
-    effect = part.effect.within(onset)
-    shares = [(one.part.effect, _share(one)) for one in rivals]
-    found = merged(whole, effect, part.shape, other, shares)
-    there = any(one.onset is not None for one in found.outcome.after.effects)
-    if not there or at_the_cost_of_others(account, found):
+    effect = part.effect.within(replace(onset, log=_name(logs, onset)))
+    rivals = [one for one in tested if one is not best and one.likely >= best.likely + np.log(ALTERNATIVE)]
+    alike = [(one.part.effect, _share(one)) for one in rivals]
+    more = merged(whole, [Found(effect, part.shape, 0.0, alike), *earlier], other)
+    if effect not in more.outcome.after.effects or at_the_cost_of_others(account, more):
         return None
-    rows = found.whole.rows & account.whole.rows
-    left = found.remaining()
-    return found if _posterior(found, left, rows) > _posterior(account, residual, rows) else None
+    rows = more.whole.rows & account.whole.rows
+    before = _posterior(account, residual, rows)
+    return more if _posterior(more, more.remaining(), rows) > before else None
 
 
 def _is_asked(account: Account) -> bool:
@@ -146,7 +162,7 @@ def _is_told(points: ChangePoints, judged: Judged, account: Account, residual: A
     constant = Known.of(evidence, effects, shapes).fit.score
     ties = 1 if part.effect.other_joint is None else 2
     worth = is_worth(evidence, constant, judged.score(rows), ties, part.effect)
-    return worth and not points.of_motion(part, judged.cut)
+    return worth and not points.gradual(part, judged.cut) and not points.of_motion(part, judged.cut)
 
 
 def _posterior(account: Account, residual: Array, rows: Mask) -> float:
