@@ -134,8 +134,8 @@ class ChangePoints:
         fine = cuts[np.abs(cuts - near) <= max(1, len(cuts) // _CUTS)]
         likely = self._told(part, fine)
         best = int(np.argmax(likely))
-        paid = price(self.evidence, part.effects) + price(self.evidence, [part.effect.within(_SOME)])
-        return float(likely[best]) + paid - log_prior(self.evidence, [part.effect]), int(fine[best])
+        paid = price(self.evidence, [part.effect.within(_SOME), *part.effects[1:]])
+        return float(likely[best]) + paid, int(fine[best])
 
     def judged(self, part: Part, cut: int) -> Judged | None:
         """An effect beside others, with the instant that all blocks choose and without each fold; None if it cannot be."""

@@ -54,12 +54,15 @@ def _with_one_more(
     account: Account, logs: Sequence[MotionLog], progress: Progress, jobs: int | None
 ) -> Account | None:
     """The account in which one more effect begins, or ends; None where none does."""
-    if not _is_asked(account):
+    if not _asked(account).any():
         return None
     progress("whether what is there began, or ended, within the run")
     whole, residual = account.whole, account.remaining()
     points = ChangePoints(known_part(whole, np.zeros_like(whole.rows)))
-    tested = [judged for judged in _likeliest(points, account) if _is_told(points, judged, account, residual)]
+    # beside an event, what a profile leaves of the whole run says little
+    least = -np.inf if account.contacts else _posterior(account, residual, points.evidence.rows)
+    asked = _likeliest(points, account, least)
+    tested = [judged for judged in asked if _is_told(points, judged, account, residual)]
     best = max(tested, key=lambda judged: judged.likely, default=None)
     if best is None:
         return None
@@ -97,16 +100,26 @@ def _with_one_more(
     return more if _posterior(more, more.remaining(), rows) > before else None
 
 
-def _is_asked(account: Account) -> bool:
-    """Whether there was more than effects that are there all the while, or these leave more than a model's shortcomings."""
+def _asked(account: Account) -> Mask:
+    """(n,) joints of which more is left than a model's shortcomings, or that have what only a run that changes asks for."""
     after = account.outcome.after
-    if account.contacts or account.unlisted is not None or any(e.of_time for e in after.effects):
-        return True
-    return bool((after.score.energy > enough(account.evidence, after.score)).any())
+    joints = np.asarray(after.score.energy > enough(account.evidence, after.score))
+    if account.contacts:
+        joints[:] = True
+    if account.unlisted is not None:
+        joints[account.unlisted.joint - 1] = True
+    for effect in after.effects:
+        if effect.of_time:
+            joints[list(effect.indices) or slice(None)] = True
+    return joints
 
 
-def _likeliest(points: ChangePoints, account: Account) -> Iterator[Judged]:
-    """The effects with the likeliest profiles, each judged beside the others."""
+def _likeliest(points: ChangePoints, account: Account, least: float) -> Iterator[Judged]:
+    """The effects with the likeliest profiles, each judged beside the others.
+
+    Args:
+        least: log posterior that a profile must exceed, which has seen all blocks.
+    """
     found: dict[object, tuple[float, int, Part]] = {}
     for effect, shape in _hypotheses(points.evidence, account):
         for others in _beside(effect, account):
@@ -114,8 +127,8 @@ def _likeliest(points: ChangePoints, account: Account) -> Iterator[Judged]:
                 best = points.best(part)
                 if best is not None and best[0] > found.get(effect.place, (-np.inf,))[0]:
                     found[effect.place] = (*best, part)
-    for _, cut, part in sorted(found.values(), key=lambda one: -one[0])[:_TRIED]:
-        judged = points.judged(part, cut)
+    for likely, cut, part in sorted(found.values(), key=lambda one: -one[0])[:_TRIED]:
+        judged = points.judged(part, cut) if likely > least else None
         if judged is not None:
             yield judged
 
@@ -124,13 +137,18 @@ def _hypotheses(evidence: Evidence, account: Account) -> Iterator[Shaped]:
     """Effects that may begin within a run: linear in their coefficients, with the nonlinear parameter found, or of none."""
     after = account.outcome.after
     known = {e.place: shape for e, shape in zip(after.effects, after.shapes, strict=True)}
+    asked = _asked(account)
     for effect in hypotheses(evidence.model.arm):
         if effect.of_time or not effect.linear or not all(evidence.rows[:, j].any() for j in effect.indices):
             continue
-        if effect.place in known:
-            yield effect, known[effect.place]
-        elif len(tried := evidence.tried(effect)) == 1:
-            yield effect, Shape.fixed(tried[0])
+        tried = evidence.tried(effect)
+        shape = known.get(effect.place) or (Shape.fixed(tried[0]) if len(tried) == 1 else None)
+        if shape is None:
+            continue
+        # of a joint of which no more is left nothing is worth a gate that acts on it alone
+        alone = evidence.smoothed(effect, shape.final).ndim == 2
+        if not alone or asked[list(effect.indices)].any():
+            yield effect, shape
 
 
 def _beside(effect: Effect, account: Account) -> list[tuple[Shaped, ...]]:
