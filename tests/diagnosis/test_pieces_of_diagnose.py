@@ -79,6 +79,7 @@ class Answers:
             "best_account": self.best,
             "judge_reversals": self.reversals,
             "account_with_load": self.loaded,
+            "account_with_onsets": lambda account, logs, progress, jobs: self.note("onsets", jobs, account),
             "outweighed": lambda *_: None,
             "drowned": lambda *_: False,
             "laws_instead": lambda whole, contacts, panel, progress: self.note("laws", panel, ["law"]),
