@@ -67,14 +67,19 @@ def library_of(revolute: tuple[bool, ...]) -> AngleSums:
     )
 
 
+def _directed(library: AngleSums) -> Index:
+    """Candidates that are sought with the joint's direction, too: those of order 1, and dry friction's level of order 2.
+
+    A bent shaft or an oval bearing rubs twice a turn; of drag too, many more functions would have to be told apart.
+    """
+    at_any_speed = (library.index < library.factors.block("v")[0]).all(axis=1)
+    return np.flatnonzero(library.order() <= 1 + at_any_speed)
+
+
 def names_of(library: AngleSums, j: int) -> list[str]:
     """Names of the functions of a law of a joint (0-based): the library's, those with its direction, its speed cubed."""
     own = f"v{j + 1}"
-    signed = [
-        f"{name}*sign({own})".removeprefix("1*")
-        for name, order in zip(library.names, library.order(), strict=True)
-        if order <= 1
-    ]
+    signed = [f"{library.names[k]}*sign({own})".removeprefix("1*") for k in _directed(library)]
     return [*library.names, *signed, f"{own}^3"]
 
 
@@ -101,7 +106,7 @@ class LawSelection:
         self.names = names_of(library, j)
         moving = evidence.samples.motion.take(np.flatnonzero(evidence.rows[:, j]))
         X, own = library.columns(moving), moving.v[:, [j]]
-        X = np.hstack([X, X[:, library.order() <= 1] * np.sign(own), own**3])
+        X = np.hstack([X, X[:, _directed(library)] * np.sign(own), own**3])
         self._folds = [self.rows.fold == k for k in range(FOLDS)]
         self._X = [X[fold] for fold in self._folds]
         self._parts = [Moments.of(X, self.y[fold]) for X, fold in zip(self._X, self._folds, strict=True)]
