@@ -82,3 +82,4 @@ def test_dry_friction_that_depends_on_the_posture_is_more_than_its_mean(model: R
     assert set(law.parameters) - set(RANGE) == {"cos(q1)*sign(v2)"}
     assert float(law.parameters["cos(q1)*sign(v2)"].value) == pytest.approx(truth[0], rel=0.02)
     assert law.rmse_with_form < 1.1 * law.baseline
+    assert found.reasons[0].startswith("coulomb_friction at joint 2 would explain 8")

@@ -213,7 +213,9 @@ def test_a_run_that_moves_is_searched(
     turned: bool,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    law = None if unlisted is None else SimpleNamespace(joint=unlisted, parameters={})
+    law = (
+        None if unlisted is None else SimpleNamespace(joint=unlisted, parameters={}, instead="drag is a part")
+    )
     answers = Answers(
         monkeypatch, found=found, contacts=contacts, unlisted=law, turned=turned, unknown=unknown
     )
@@ -235,7 +237,8 @@ def test_a_run_that_moves_is_searched(
         ("errors", True),
         [] if unlisted is None else [unlisted],
     )
-    assert made.reasons == ["stands", "zeros of ['run']"] and made.zeros.tolist() == [[0.1] * 3]
+    part = [] if law is None else ["drag is a part"]
+    assert made.reasons == [*part, "stands", "zeros of ['run']"] and made.zeros.tolist() == [[0.1] * 3]
 
 
 def test_the_account_with_a_load_takes_the_place_of_that_without(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -374,7 +377,7 @@ def test_an_event_that_may_be_of_an_unknown_rest_goes_and_is_told(
 ) -> None:
     """A residual that the verdict names is a rest as long as it has no law."""
     other = SimpleNamespace(added="other push", rows=np.zeros(4, dtype=bool))
-    unlisted = SimpleNamespace(joint=3, parameters={"law": form} if form else {})
+    unlisted = SimpleNamespace(joint=3, parameters={"law": form} if form else {}, instead="")
     Answers(monkeypatch, contacts=[CONTACT, other], unlisted=unlisted)
     asked: list[Any] = []
 

@@ -28,7 +28,10 @@ class TestLawThatIsNotListed:
             joint, block = np.array([0, 1, 1, 1, 1]), np.array([0, 0, 0, 1, 1])
             held_out = np.array([9.0, *np.full(4, np.sqrt(energy / 4))])
             fit = SimpleNamespace(score=Score.of(sum(found), held_out, joint, block, 2))
-            effects = [SimpleNamespace(effect=SimpleNamespace(complexity=c)) for c in found]
+            effects = [
+                SimpleNamespace(effect=SimpleNamespace(complexity=c, label=lambda c=c: f"effect {c}"))
+                for c in found
+            ]
             return SimpleNamespace(found=effects, after=fit)
 
         with_effects, without = outcome([1, 2], left), outcome([], bare)
@@ -57,9 +60,14 @@ class TestLawThatIsNotListed:
         assert (kept, found.form) == ("bare", "1*v2^3 +1*v2^3 +1*v2^3")
         assert found.rmse_with_form == pytest.approx(2 * np.sqrt(50 / 4))
         assert found.rmse == pytest.approx(2 * np.sqrt(400 / 4)) and found.parameters
+        # 100 of 400 is left, and 50 by the law
+        assert found.instead == (
+            "effect 1 and effect 2 would explain 75% of joint 2's residual, but leave 1.4 times what the law does that is "
+            "stated in place of it"
+        )
         for simpler, terms in ((52.1, 3), (50.0, 4), (50.0, 0), (99.0, 3)):
             found, kept = self.found(monkeypatch, simpler, terms, 100.0, 400.0)
-            assert (kept, found.form, found.parameters) == ("effects", "", {})
+            assert (kept, found.form, found.parameters, found.instead) == ("effects", "", {}, "")
             assert found.rmse == pytest.approx(2 * np.sqrt(100 / 4))
 
     def test_effects_that_leave_most_are_struck_off(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,7 +108,10 @@ class TestLawThatIsNotListed:
     ) -> None:
         """Of joint 2 the effects leave ``left`` on 100 rows, the law ``rest``."""
         asked: list[int] = []
-        named = [SimpleNamespace(effect=SimpleNamespace(indices=(1,), complexity=1)) for _ in range(2)]
+        named = [
+            SimpleNamespace(effect=SimpleNamespace(indices=(1,), complexity=1, label=lambda: "effect"))
+            for _ in range(2)
+        ]
         arm = SimpleNamespace(effect=SimpleNamespace(indices=(), complexity=3))
 
         def verdict(

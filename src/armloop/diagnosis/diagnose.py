@@ -331,7 +331,7 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     outcome = strongest_first(evidence, plainest(evidence, outcome, searched))
     progress("how far the run can be judged")
     known = [] if unlisted is None else [unlisted.joint]
-    doubted: list[str] = []
+    doubted = [unlisted.instead] if unlisted is not None and unlisted.instead else []
     while True:
         fitted = beside = outcome
         if bare is not evidence:

@@ -132,6 +132,14 @@ def in_doubt(label: str, share: float) -> str:
     )
 
 
+def part_of_a_law(labels: Sequence[str], joint: int, share: float, times: float) -> str:
+    """A sentence on effects that explain a part (of the energy) of what a law does, and leave so many times more (RMS)."""
+    return (
+        f"{' and '.join(labels)} would explain {share:.0%} of joint {joint}'s residual, but leave {times:.1f} times what "
+        "the law does that is stated in place of it"
+    )
+
+
 def event_in_doubt(event: AddedEffect) -> str:
     """A sentence on an event that removes no more than what nothing accounts for at other times."""
     start, end = ends(event.parameters)

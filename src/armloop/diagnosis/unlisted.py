@@ -27,6 +27,7 @@ from armloop.diagnosis.judgement import (
 )
 from armloop.diagnosis.lasting import FEWEST, lasting
 from armloop.diagnosis.law_selection import Law, LawSelection, law_left, library_of, names_of
+from armloop.diagnosis.reasons import part_of_a_law
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import (
     Found,
@@ -41,7 +42,7 @@ from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law, hypotheses
 from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 from armloop.util.progress import Progress
 
 #: A residual is real if a law found on one half of the run explains as much of the other as a listed effect must, or if
@@ -64,6 +65,7 @@ class Unlisted:
         parameters: the law's coefficients by their functions' names, with standard errors, and the range of the run
             (:class:`armloop.laws.effects.FoundLaw`); empty where there is no law.
         left: (R,) what the law leaves of the joint's rows, weighted, on blocks it was not fitted on.
+        instead: what listed effects would explain in whose place the law is, a sentence; empty if it is in nobody's.
     """
 
     joint: int
@@ -73,6 +75,7 @@ class Unlisted:
     rmse_with_form: float
     parameters: dict[str, Estimate] = field(default_factory=dict)
     left: Array = field(default_factory=lambda: np.zeros(0), repr=False)
+    instead: str = ""
 
     def added(self) -> list[AddedEffect]:
         """The law as an effect that a model can have; none where there is no law."""
@@ -129,7 +132,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
         return stated, with_effects(without_law(evidence, stated), kept, listed)
     if len(bare.found) < len(outcome.found):
         if _is_simpler(evidence, simpler, outcome, bare, j):
-            law, outcome = simpler, bare
+            return _in_place(evidence, outcome, bare, simpler, j)
         elif outcome.after.score.energy[j] > FORCED * bare.after.score.energy[j]:
             return find_law(evidence, bare, progress)
     return _stated(evidence, outcome, law, j), pruned(evidence, outcome)
@@ -150,8 +153,19 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
         if not _is_simpler(evidence, law, outcome, bare, j):
             continue
         if len(there) > 1 or not _does_as_well(evidence, bare, there[0].rivals, law, j):
-            return _stated(evidence, bare, law, j), pruned(evidence, bare)
+            return _in_place(evidence, outcome, bare, law, j)
     return None, outcome
+
+
+def _in_place(
+    evidence: Evidence, outcome: Outcome, bare: Outcome, law: Law, j: int
+) -> tuple[Unlisted, Outcome]:
+    """The law in place of the effects that are found and are not in the bare outcome, which is what stays."""
+    labels = [f.effect.label() for f in outcome.found if f not in bare.found]
+    named, before = (float(each.after.score.energy[j]) for each in (outcome, bare))
+    times = float(np.sqrt(named / max(law.score.error, TINY)))
+    words = part_of_a_law(labels, j + 1, 1 - named / before, times)
+    return replace(_stated(evidence, bare, law, j), instead=words), pruned(evidence, bare)
 
 
 def _does_as_well(
