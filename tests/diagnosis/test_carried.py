@@ -163,23 +163,26 @@ def test_what_is_beside_a_load_is_found_too(model: ReconstructedModel, seed: int
 
 
 @pytest.mark.parametrize(
-    ("left", "law", "events", "asked"),
+    ("left", "law", "events", "named", "asked"),
     [
-        (3.9, None, [], False),
-        (4.1, None, [], True),
-        (0.0, "a law", [], True),
-        (0.0, None, [None], False),
-        (0.0, None, [None, 2], False),
-        (0.0, None, [None, None], True),
+        (3.9, None, [], [], False),
+        (4.1, None, [], [], True),
+        (0.0, "a law", [], [], True),
+        (0.0, None, [None], [], False),
+        (0.0, None, [None, 2], [], False),
+        (0.0, None, [None, None], [], True),
+        (0.0, None, [], ["coulomb_friction"], False),
+        (0.0, None, [], ["coulomb_friction", "payload"], True),
     ],
 )
-def test_it_is_asked_where_much_is_left_or_several_forces_came_and_went(
-    left: float, law: str | None, events: list[int | None], asked: bool
+def test_it_is_asked_where_much_is_left_a_load_is_named_or_several_forces_came_and_went(
+    left: float, law: str | None, events: list[int | None], named: list[str], asked: bool
 ) -> None:
     score = SimpleNamespace(energy=np.array([0.0, 10 * left]), rows=np.array([10, 10]))
+    found = [SimpleNamespace(effect=effect(name, None if name == "payload" else 1)) for name in named]
     account: Any = SimpleNamespace(
         unlisted=law,
-        outcome=SimpleNamespace(after=SimpleNamespace(score=score)),
+        outcome=SimpleNamespace(found=found, after=SimpleNamespace(score=score)),
         contacts=[SimpleNamespace(added=SimpleNamespace(effect=SimpleNamespace(joint=j))) for j in events],
     )
     assert carrying._is_asked(account) is asked

@@ -2,9 +2,10 @@
 
 Load and intervals are found in turn (hard expectation maximisation). The load being given, the likeliest sequence of carried
 and not carried follows by dynamic programming (Viterbi 1967), each change at a price; the sequence being given, the load is
-regressed. It is looked for where the effects found leave more than the model's own shortcomings, or several forces came and
-went, and taken if what is then left is far less: what comes and goes is no law of the motion, and a search for laws would
-find the nearest. When the load is carried, all samples say; how heavy it is, only those outside the fold that is judged.
+regressed. It is looked for where the effects found leave more than the model's own shortcomings or are a load themselves, or
+several forces came and went, and taken if what is then left is far less: what comes and goes is no law of the motion, and a
+search for laws would find the nearest. When the load is carried, all samples say; how heavy it is, only those outside the
+fold that is judged.
 """
 
 from __future__ import annotations
@@ -107,13 +108,14 @@ def _found(load: CarriedLoad) -> Found:
 
 
 def _is_asked(account: Account) -> bool:
-    """Whether a law was stated, some joint's error is a multiple of the baseline, or there were several forces.
+    """Whether a law or a load was named, some joint's error is a multiple of the baseline, or there were several forces.
 
-    What comes and goes may be one thing that is gripped and let go, again and again.
+    What comes and goes may be one thing that is gripped and let go, again and again; a load may have been there at times.
     """
+    named = any(isinstance(found.effect, Payload) for found in account.outcome.found)
     forces = sum(contact.added.effect.joint is None for contact in account.contacts)
     much = much_is_left(account.outcome.after.score).any()
-    return account.unlisted is not None or bool(much) or forces > 1
+    return account.unlisted is not None or named or bool(much) or forces > 1
 
 
 def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
