@@ -429,7 +429,9 @@ def _check_time(time: Array, label: str, place: Callable[[int], str]) -> None:
     if len(late):
         row = int(late[0]) + 1
         repeated = time[row] == time[row - 1]
-        right = "; leave out rows that repeat the last one's time (`armloop convert` does)" if repeated else ""
+        right = (
+            "; leave out rows that repeat the last one's time (`armloop convert` does)" if repeated else ""
+        )
         raise LogError(
             f"{label}: column time, {place(row)}: {time[row]:.9g} follows {time[row - 1]:.9g}; "
             f"time must rise strictly from row to row{right}"
