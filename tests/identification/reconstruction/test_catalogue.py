@@ -27,11 +27,11 @@ COUPLING = {"inertia": 0.05, "viscous": 0.4, "coulomb": 0.5}
 SPRING = {"stiffness": 6.0, "rest": 0.3}
 
 
-def coupled(motion: Motion, ratio: float = -1.0) -> Array:
+def coupled(motion: Motion, ratio: float = -1.0, inertia: float = COUPLING["inertia"]) -> Array:
     """A motor that turns with v2 ± v3."""
     v, vdot = motion.v, motion.vdot
     w, rate = v[:, 1] + ratio * v[:, 2], vdot[:, 1] + ratio * vdot[:, 2]
-    torque = COUPLING["inertia"] * rate + COUPLING["viscous"] * w + COUPLING["coulomb"] * np.sign(w)
+    torque = inertia * rate + COUPLING["viscous"] * w + COUPLING["coulomb"] * np.sign(w)
     return np.outer(torque, [0, 1, ratio])
 
 
@@ -80,6 +80,21 @@ def test_a_coupling_is_found_in_the_training_data(seed: int) -> None:
     assert added.parameters["ratio"].value == -1.0
     assert any("always there" in note for note in found.notes)
     assert max(found.held_out.moving["nrmse"]) < 0.05
+
+
+@pytest.mark.parametrize("physical", [True, False])
+def test_a_coupling_of_gears_without_a_motor_has_no_negative_inertia(physical: bool, tmp_path: Path) -> None:
+    """Its least-squares estimate is below zero every second time, and a model with a law that cannot be is not read."""
+    options = replace(PLAIN, physical=physical)
+    inertias = []
+    for seed in range(3):
+        log = run([partial(coupled, inertia=0.0)], seed)
+        found = reconstruct([log], three_axis(), library="rigid-body", options=options)
+        assert named(found) == [("transmission_coupling", 2, 3)]
+        inertias.append(found.model.effects[0].parameters["inertia"].value)
+        found.model.save(tmp_path / f"{seed}.json")
+        load_model(tmp_path / f"{seed}.json")
+    assert min(inertias) == 0.0
 
 
 def test_a_spring_is_found_in_the_training_data() -> None:

@@ -29,7 +29,7 @@ def effect(inertias: Any, **of: Any) -> Any:
         torque = np.einsum("ijp,nj->nip", inertias, motion.vdot) * np.cos(motion.q[:, :1, None])
         return shape * (torque + 5.0 + motion.q[:, :, None])
 
-    flags = {"needs_model": False, "memory": False, "load": False} | of
+    flags = {"needs_model": False, "memory": False, "load": False, "passive": False} | of
     return SimpleNamespace(fixed_columns=columns, **flags)
 
 
@@ -60,6 +60,9 @@ def test_the_mass_matrix_of_bodies_and_laws_is_what_its_columns_add_up_to() -> N
     theta = RNG.normal(size=base.count + 2)
     np.testing.assert_allclose(body.mass(theta, q), body.columns(q) @ theta, atol=1e-9)
     assert body.positive.tolist() == [*base.positive.tolist(), False, False]
+    mixed = Laws([Law(effect(INERTIAS), 2.0, 2), Law(effect(INERTIAS, passive=True), 2.0, 2)])
+    body = body_of(arm, base, mixed, fourier_motion(2.0, 100.0, 1))
+    assert body.positive.tolist() == [*base.positive.tolist(), False, False, True, True]
 
 
 def test_a_column_that_is_constant_at_a_joint_and_not_zero_there() -> None:

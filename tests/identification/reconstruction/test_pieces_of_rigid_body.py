@@ -32,9 +32,10 @@ def added(q: np.ndarray) -> np.ndarray:
 
 
 class Laws:
-    """Two coefficients, of which the first is an inertia."""
+    """Two coefficients: the first is found to be an inertia, the second is said to be negative for no arm."""
 
     count = 2
+    passive = np.array([False, True])
 
     def mass(self, arm: Any, q: np.ndarray) -> np.ndarray:
         return added(q)
@@ -157,7 +158,7 @@ class TestWhole:
         assert not asked["positive"] and len(asked["realizable"]) == 2
         _, positive, memory = asked["realizable"][0]
         # an inertia of laws, and all friction but an offset
-        assert positive == [True, False, False, True, True, True, True] and memory == 3.0
+        assert positive == [True, True, False, True, True, True, True] and memory == 3.0
         assert found.history["kept_positive"] == "everywhere" and found.history["constraints"] == 0
         assert found.history["held"] == {first: -1.0} and found.history["negative"] == {second: -2.0}
         (body,) = found.components
@@ -183,7 +184,7 @@ def test_the_mass_matrix_is_that_of_bodies_and_of_laws() -> None:
     expected = rigid_body.mass_matrix(three_axis(), BASE, theta[:-2], q) + added(q) @ theta[-2:]
     np.testing.assert_allclose(body.mass(theta, q), expected, atol=1e-12)
     np.testing.assert_allclose(body.columns(q) @ theta, expected, atol=1e-8)
-    assert body.positive.tolist() == [*BASE.positive.tolist(), False, False]
+    assert body.positive.tolist() == [*BASE.positive.tolist(), False, True]
 
 
 def test_links_may_differ_from_the_urdfs_by_half_decades_of_kilograms() -> None:

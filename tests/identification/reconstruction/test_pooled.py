@@ -174,6 +174,21 @@ def test_passive_friction_is_non_negative_least_squares_but_for_offsets(seed: in
     assert free[[5, 6, 8, 9]].min() < 0
 
 
+@pytest.mark.parametrize("passive", [True, False])
+def test_shared_coefficients_that_are_held_are_not_negative(passive: bool) -> None:
+    """Of the four the second is -2; the others are what least squares make of it."""
+    data = Data()
+    held = np.array([True, True, False, False])
+    theta = data.pooled(held=held, passive=passive).solve(EVERY).theta
+    free = data.pooled(passive=passive).solve(EVERY).theta
+    assert free[1] < -1.9 and theta[1] == 0.0 and theta[0] > 0.0
+    X, y, joint = data.rows([0, 1, 2], EVERY)
+    weight = np.sqrt(data.pooled(held=held, passive=passive).solve(EVERY).weights)[joint]
+    low = np.where([*held, *([False, passive, passive] * 2)], 0.0, -np.inf)
+    best = lsq_linear(X * weight[:, None], y * weight, (low, np.inf), tol=1e-12)
+    np.testing.assert_allclose(theta, best.x, rtol=1e-3, atol=1e-4)
+
+
 def test_the_evidence_of_a_prior_is_the_probability_of_the_data() -> None:
     data, weights = Data(), np.array([2.0, 0.3])
     # no friction: all coefficients have the prior, and y is Gaussian

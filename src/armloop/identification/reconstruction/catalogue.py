@@ -30,7 +30,7 @@ from armloop.identification.reconstruction.projected import CHANCE, Projected, T
 from armloop.laws.effects import Context, Effect, hypotheses
 from armloop.model import AddedEffect
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress
 
 #: Part of the squared error of the joint it shows on most that a law must remove.
@@ -93,6 +93,13 @@ class Laws:
     def loading(self) -> Array:
         """(p,) one for coefficients of laws that load the joints, else zero."""
         return np.repeat([float(law.effect.load) for law in self.chosen], [law.size for law in self.chosen])
+
+    @property
+    def passive(self) -> Mask:
+        """(p,) whether each coefficient is negative for no arm, as its law says."""
+        return np.repeat(
+            [law.effect.passive for law in self.chosen], [law.size for law in self.chosen]
+        ).astype(bool)
 
     def raw(self, arm: Arm, motion: Motion, period: float) -> Array:
         """(N, n, p) torque per unit of each coefficient, unfiltered."""

@@ -65,6 +65,11 @@ class Design:
         """The number r + p of shared coefficients."""
         return self.count + self.laws.count
 
+    @property
+    def passive(self) -> Mask:
+        """(r + p,) shared coefficients that are negative for no arm, as laws say; the library's have other bounds."""
+        return np.concatenate([np.zeros(self.count, dtype=bool), self.laws.passive])
+
     def with_laws(self, laws: Laws) -> Design:
         """The same library beside other laws; the load remains that of the library, as far as it is known."""
         load = None if self.load is None else np.concatenate([self.load[: self.count], np.zeros(laws.count)])

@@ -102,7 +102,7 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         lambda theta, q: columns(q) @ theta,
         postures(motion),
         *joint_limits(arm, motion_range(motion)),
-        np.zeros(r, dtype=bool),
+        design.with_laws(laws).passive,
     )
 
     def regressed(held_out: bool) -> tuple[Found, Array]:

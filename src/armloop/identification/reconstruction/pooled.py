@@ -5,7 +5,8 @@ fold. Any choice of friction terms is then solved, and judged on the folds held 
 is the model that is handed out, which is regressed on what judged it, too.
 
 Friction is passive where asked for: but for constant offsets, every term dissipates on its own, so its coefficient
-must not be negative. That keeps collinear candidates (widths, speeds) in check: most of them come out as zero.
+must not be negative. That keeps collinear candidates (widths, speeds) in check: most of them come out as zero. Of
+laws of the catalogue that are passive no coefficient is negative either way.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from armloop.identification.reconstruction.joint_sums import JointSums
 from armloop.identification.reconstruction.projected import RIDGE
 from armloop.laws.friction import FrictionTerm, Sliding
 from armloop.regression.moments import Moments, total, unit_length
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Mask
 from armloop.util.functions import NUMPY
 
 #: For every joint the candidates of its friction that are used, by their place.
@@ -71,6 +72,8 @@ class Pooled:
         folds: their number.
         repeats: neighbouring samples that tell no more than one does.
         passive: whether friction terms must dissipate.
+        held: shared coefficients that must not be negative whether friction dissipates or not: a model whose laws
+            cannot be is none.
     """
 
     def __init__(
@@ -80,10 +83,12 @@ class Pooled:
         folds: int = 1,
         repeats: float = 1.0,
         passive: bool = False,
+        held: Mask | None = None,
     ) -> None:
         self.shared = len(sums.parts[0][0].b) - len(candidates[0])
         self.candidates = candidates
         self.passive = passive
+        self._held = np.zeros(self.shared, dtype=bool) if held is None else held
         self.folds = folds
         self.repeats = repeats
         self._parts = [own[:folds] for own in sums.parts]
@@ -209,6 +214,7 @@ class Pooled:
         G, b = G * np.outer(scale, scale), scale * b
         G[np.diag_indices(len(b))] += _ROUND_OFF
         bound = np.zeros(len(b), dtype=bool)
+        bound[: self.shared] = self._held
         if self.passive:
             kinds = [self.candidates[j][k].kind for j, chosen in enumerate(choice) for k in chosen]
             bound[self.shared :] = [kind != "offset" for kind in kinds]

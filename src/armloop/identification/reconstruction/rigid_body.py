@@ -86,7 +86,8 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     ) -> tuple[Array, Array, dict[str, Any]]:
         """Coefficients of bodies that can exist, or, if the data contradict those, with M positive where it matters."""
         passive = [term.kind != "offset" for law in friction for term in law]
-        positive = np.array([*laws.inertial(arm, shape.seen), *passive], dtype=bool)
+        lawful = laws.passive | np.array(laws.inertial(arm, shape.seen), dtype=bool)
+        positive = np.array([*lawful, *passive], dtype=bool)
         bodies = realizable_solution(solution, arm, base, nominal, positive, training.memory)
         if bodies.accepted:
             return bodies.theta, bodies.full, PhysicalSolution(bodies.theta, 0, EVERYWHERE).to_dict()
@@ -143,7 +144,7 @@ def body_of(arm: Arm, base: BaseParameters, laws: Laws, motion: Motion) -> Body:
         ),
         postures(motion),
         *joint_limits(arm, motion_range(motion)),
-        np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
+        np.concatenate([base.positive, laws.passive]),
     )
 
 

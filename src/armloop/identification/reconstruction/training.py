@@ -129,11 +129,11 @@ class Training:
         deal = partial(_by_fold, folds=folds)
         sums_of = partial(JointSums.of, design=design, candidates=candidates, deal=deal)
         sums = self.data.sum(sums_of, "normal equations of all friction that may be")
-        return Pooled(sums, candidates, count, self.repeats, passive)
+        return Pooled(sums, candidates, count, self.repeats, passive, design.passive)
 
     def window_pooled(self, design: Design, laws: list[list[FrictionTerm]], passive: bool) -> Pooled:
         """The same of the window, all of it one fold."""
-        return Pooled(self.window_sums(design, laws), laws, 1, self.repeats, passive)
+        return Pooled(self.window_sums(design, laws), laws, 1, self.repeats, passive, design.passive)
 
     def window_sums(self, design: Design, laws: list[list[FrictionTerm]]) -> JointSums:
         """Normal equations of the window."""

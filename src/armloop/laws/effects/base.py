@@ -161,6 +161,7 @@ class Effect(ABC):
         memory: whether it depends on the path or the time, not only on q, v and vdot.
         of_time: whether it depends on the time since the start of a run; to a controller the start is long ago.
         simulated: whether Drake's systems can have it; else it is found in logs alone.
+        passive: whether each of its coefficients is an inertia, or dissipates on its own, so that it is negative for no arm.
         rubs: whether it is friction of one joint and nothing else, as the friction selection of a reconstruction has it.
         periodic: whether its shape is a number of cycles per revolution of its joint.
         fault_order: of sensors: a record is falsified by the lower ones first.
@@ -188,6 +189,7 @@ class Effect(ABC):
     memory: ClassVar[bool] = False
     of_time: ClassVar[bool] = False
     simulated: ClassVar[bool] = True
+    passive: ClassVar[bool] = False
     rubs: ClassVar[bool] = False
     periodic: ClassVar[bool] = False
     fault_order: ClassVar[int] = 9

@@ -18,6 +18,7 @@ class TransmissionCoupling(Law):
 
     name = "transmission_coupling"
     scope = "pair"
+    passive = True
     parameters = (
         Parameter("inertia", "INERTIA", least=0.0),
         Parameter("viscous", "TAU*s/POS", least=0.0),
