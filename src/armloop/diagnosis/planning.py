@@ -25,6 +25,7 @@ from armloop.experiment.design import (
     Regression,
     Series,
     check_rest,
+    hardly_any_motion,
     random_references,
     sampled,
     unexplained,
@@ -95,7 +96,7 @@ def _typical(model: ReconstructedModel, wish: Wish) -> tuple[Limits, list[Fourie
     check_rest(model.arm, limits)
     drawn = random_references(limits, PERIOD, _TYPICAL, wish.seed)
     if not drawn:
-        raise InputError(f"{model.arm.name}: hardly any motion keeps within the effort limits; widen them")
+        raise hardly_any_motion(model.arm, limits)
     return limits, drawn
 
 

@@ -192,6 +192,15 @@ def test_an_arm_that_cannot_hold_itself() -> None:
         excite(with_effort(arm, 0.05), ranges, Settings())
 
 
+def test_an_arm_that_can_hardly_hold_itself_is_told_which_joint_is_too_weak() -> None:
+    """A URDF with the same effort at every joint, for want of a number: one posture in a hundred can be held."""
+    arm = load_arm("three_axis")
+    arm = replace(arm, joints=tuple(replace(joint, effort=0.4) for joint in arm.joints))
+    says = r"hardly any motion .*: joint 'joint_2' may give 0\.32 N.m, and rest alone takes more in 9\d % .*, up to 7\.3"
+    with pytest.raises(InputError, match=says):
+        excite(arm, MotionRanges.of(arm), Settings(library="rigid-body"))
+
+
 def test_an_arm_without_effort_limits_is_told_so(made: Excitation) -> None:
     assert any("the torque there is unbounded" in note for note in made.notes)
     assert not made.use[3].any()

@@ -8,7 +8,7 @@ from armloop.experiment.design.criteria import CRITERIA, Criterion, condition_nu
 from armloop.experiment.design.data_ratio import DataRatio, amount_needed, data_ratio
 from armloop.experiment.design.excite import Excitation, Measure, excite, measured
 from armloop.experiment.design.information import Columns, Regression
-from armloop.experiment.design.limits import Limits, TorqueLaw, check_rest, nominal_torque
+from armloop.experiment.design.limits import Limits, TorqueLaw, check_rest, hardly_any_motion, nominal_torque
 from armloop.experiment.design.optimise import Design, Problem
 from armloop.experiment.design.random import random_references
 from armloop.experiment.design.series import Series, sampled
@@ -35,6 +35,7 @@ __all__ = [
     "condition_number",
     "data_ratio",
     "excite",
+    "hardly_any_motion",
     "measured",
     "nominal_torque",
     "random_references",

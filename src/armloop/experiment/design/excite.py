@@ -12,7 +12,14 @@ from armloop.experiment.design.columns import double_feature_columns, rigid_body
 from armloop.experiment.design.criteria import CRITERIA, ROUND_OFF, condition_number
 from armloop.experiment.design.data_ratio import DataRatio, data_ratio, spread
 from armloop.experiment.design.information import Regression
-from armloop.experiment.design.limits import LIMITED, Limits, TorqueLaw, check_rest, nominal_torque
+from armloop.experiment.design.limits import (
+    LIMITED,
+    Limits,
+    TorqueLaw,
+    check_rest,
+    hardly_any_motion,
+    nominal_torque,
+)
 from armloop.experiment.design.optimise import Problem
 from armloop.experiment.design.random import random_references
 from armloop.experiment.design.series import Series, sampled
@@ -130,10 +137,7 @@ def excite(
     progress(f"{settings.random} random references of {timing.period:g} s within the limits")
     drawn = random_references(limits, timing.period, settings.random, settings.seed)
     if len(drawn) < 3:
-        raise InputError(
-            f"{arm.name}: hardly any motion keeps within the effort limits; widen them, or narrow the ranges around "
-            "postures that the drives can hold"
-        )
+        raise hardly_any_motion(arm, limits)
     step = timing.period / (32 * timing.harmonics)
     typical = [sampled(reference, min(step, _STEP)) for reference in drawn]
     regression = _regression(arm, limits, settings, typical)

@@ -118,10 +118,7 @@ def nominal_torque(arm: Arm) -> TorqueLaw:
 
 def check_rest(arm: Arm, limits: Limits) -> None:
     """Raise ``InputError`` if a drive is too weak to hold the arm still anywhere in its ranges."""
-    poses = static_poses(limits.ranges, 400, 0)
-    still = np.zeros_like(poses)
-    rest = Motion(np.arange(float(len(poses))), poses, still, still)
-    need = np.abs(limits.torque(rest))
+    need = _at_rest(limits)
     if np.any(np.all(need <= limits.effort, axis=1)):
         return
     short = np.argmax((need / limits.effort).min(axis=0))
@@ -131,3 +128,28 @@ def check_rest(arm: Arm, limits: Limits) -> None:
         f"{joint.torque_unit} at joint {joint.name!r}, its drive may give {limits.effort[short]:.3g}; widen the effort "
         "limits or the ranges"
     )
+
+
+def hardly_any_motion(arm: Arm, limits: Limits) -> InputError:
+    """What to say where random motions do not fit: the joint that most often is too weak to hold the arm at rest."""
+    need = _at_rest(limits)
+    share = (need > limits.effort).mean(axis=0)
+    worst = int(np.argmax(share))
+    joint = arm.joints[worst]
+    where = ""
+    if share[worst] > 0:
+        where = (
+            f": joint {joint.name!r} may give {limits.effort[worst]:.3g} {joint.torque_unit}, and rest alone takes more in "
+            f"{100 * share[worst]:.0f} % of the ranges, up to {need[:, worst].max():.3g}"
+        )
+    return InputError(
+        f"{arm.name}: hardly any motion keeps within the effort limits{where}; widen them, or narrow the ranges around "
+        "postures that the drives can hold"
+    )
+
+
+def _at_rest(limits: Limits) -> Array:
+    """Torques (400, n) that random postures within the ranges take, N*m (N)."""
+    poses = static_poses(limits.ranges, 400, 0)
+    still = np.zeros_like(poses)
+    return np.abs(limits.torque(Motion(np.arange(float(len(poses))), poses, still, still)))
