@@ -45,6 +45,31 @@ def test_eta_stands_beside_the_papers(loop: SimpleNamespace) -> None:
     assert len(eta_table(loop.tracking).headers) == 4
 
 
+@pytest.mark.parametrize(
+    ("joint", "more", "tool", "said"),
+    [
+        (None, {}, 0.0, True),
+        (None, {}, 0.1, False),
+        (None, {"link": Estimate(2.0, 0.1, "1")}, 0.0, False),
+        (1, {}, 0.0, False),
+    ],
+)
+def test_a_force_on_a_tool_that_the_urdf_lacks_is_said_to_be_at_the_last_joint(
+    clean: Diagnosis, joint: int | None, more: dict[str, Estimate], tool: float, said: bool
+) -> None:
+    """Four fifths of a force's lever may be missing, and its stated error tells nothing of that."""
+    name, size = ("external_torque", "torque") if joint else ("external_contact", "force")
+    given = {"start": 1.0, "end": 2.0, size: 3.0 if joint else [3.0, 0.0, 0.0]}
+    parameters = {key: Estimate(value, value, "") for key, value in given.items()} | more
+    X_tool = np.eye(4)
+    X_tool[2, 3] = tool
+    contact = SimpleNamespace(added=AddedEffect(effect(name, joint), parameters), share=0.76)
+    model = replace(clean.model, arm=replace(clean.model.arm, X_tool=X_tool))
+    text = " ".join(findings(replace(clean, contacts=[contact], model=model)))
+    assert ("no link named `tool`" in text) == said
+    assert "76 % of the burst" in text
+
+
 def test_steps_and_scores(loop: SimpleNamespace) -> None:
     steps = steps_table(loop.reconstruction.reports)
     assert [row[0] for row in steps.rows] == ["1", "2", "3"]

@@ -37,6 +37,7 @@ def findings(diagnosis: Diagnosis) -> list[str]:
         ],
         "contacts": diagnosis.contacts,
         "events": _events(diagnosis),
+        "toolless": _toolless(diagnosis),
         "judged": diagnosis.judged,
         "unlisted": unlisted,
         "adopted": diagnosis.adopted,
@@ -52,6 +53,13 @@ def _events(diagnosis: Diagnosis) -> str:
     forces = all(contact.added.effect.joint is None for contact in diagnosis.contacts)
     links = any("link" in contact.added.parameters for contact in diagnosis.contacts)
     return "events" if not forces else "pushes on the arm" if links else "pushes at the tool"
+
+
+def _toolless(diagnosis: Diagnosis) -> bool:
+    """Whether a force is said to act on the tool of an arm that has no such link: at its last joint, for want of it."""
+    effects = [contact.added for contact in diagnosis.contacts]
+    on_tool = any(e.effect.name == "external_contact" and "link" not in e.parameters for e in effects)
+    return on_tool and np.array_equal(diagnosis.model.arm.X_tool, np.eye(4))
 
 
 def _nothing(diagnosis: Diagnosis) -> str:
