@@ -115,3 +115,18 @@ def test_what_blocks_and_cells_have_in_common_counts_once() -> None:
     own = np.linalg.solve(X.T @ X, X.T @ errors)
     expected = clustered_covariance(X, left, block) + added * np.outer(unit, unit) + own @ own.T
     assert_allclose(fit.covariance(X, left, rows), expected, rtol=1e-6)
+
+
+def test_what_a_run_shows_alone_counts_no_error_of_the_model() -> None:
+    """A column of ones on eight samples whose mean is 3, and a model that may be wrong by 1.5 all the while."""
+    y = 3.0 + np.array([1.0, -1.0] * 4)
+    blocks = np.arange(8)
+    ones = np.ones((8, 1))
+    rows = fit.Stacked(ones, y, blocks, blocks % 2, np.zeros(8, dtype=int), 1, blocks, 1.5 * ones)
+    solution = fit.Solution(np.array([3.0]), [np.array([3.0])], np.eye(1), [0.0])
+    own: Any = effect("viscous_friction", 1)
+    found = fit.Fit(None, (own,), (), solution, np.zeros((2, 8)), rows)  # type: ignore[arg-type]
+    spread = float(fit.covariance(ones, y - 3.0, rows)[0, 0])
+    assert found.clear[0] == pytest.approx(3.0 / np.sqrt(spread), rel=1e-6)
+    assert found.shown[0] == pytest.approx(3.0 / np.sqrt(spread - 1.5**2), rel=1e-6)
+    assert found.clear[0] < 2.0 < 3.0 < found.shown[0]

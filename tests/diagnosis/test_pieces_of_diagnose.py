@@ -13,6 +13,7 @@ import pytest
 
 from armloop.diagnosis.diagnose import Diagnosis, diagnose
 from armloop.diagnosis.unlisted import Unlisted
+from armloop.laws.effects import effect
 from armloop.model import ReconstructedModel
 from armloop.util.errors import InputError
 from armloop.util.finite import finite
@@ -122,7 +123,9 @@ class Answers:
         return Standing(["stands"], unknown=self.given["unknown"])
 
     def outcome(self, name: str) -> Any:
-        return SimpleNamespace(name=name, found=self.given["found"], added=lambda: [*self.given["found"]])
+        return SimpleNamespace(
+            name=name, found=self.given["found"], added=lambda: [*self.given["found"]], masked=()
+        )
 
     def best(self, whole: Evidence, contacts: Any, progress: Any, panel: Any) -> Any:
         self.asked["best"] = (whole.name, contacts, panel)
@@ -281,7 +284,7 @@ def of(**given: Any) -> Diagnosis:
         arm=SimpleNamespace(torque_units=["N*m"] * 3),
         with_effects=lambda law: SimpleNamespace(arm=model.arm, effects=law),
     )
-    outcome: Any = SimpleNamespace(before=before, after=after, found=[])
+    outcome: Any = SimpleNamespace(before=before, after=after, found=[], masked=())
     values = {"verdict": "no_effect", "outcome": outcome, "model": model, "unlisted": None, "sliding": rows}
     return Diagnosis(**(values | {"evidence": evidence, "contacts": []} | given))
 
@@ -341,6 +344,14 @@ def test_what_friction_is_at_reversals_alone() -> None:
     assert not of()._only_at_reversals(one)  # type: ignore[arg-type]
 
 
+def test_what_the_models_own_errors_hide_is_said_of_a_joint_of_which_more_is_left() -> None:
+    hidden, stated, elsewhere = (effect("viscous_friction", joint) for joint in (2, 2, 1))
+    outcome: Any = SimpleNamespace(found=[])
+    assert module._is_left(hidden, outcome, (1,)) and not module._is_left(elsewhere, outcome, (1,))
+    outcome.found = [SimpleNamespace(effect=stated)]
+    assert not module._is_left(hidden, outcome, (1,))
+
+
 def test_what_is_outweighed_by_an_unknown_rest_goes_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two effects, of which the first goes, and with it one of two events; the other is asked with what is left."""
     spring, load = (SimpleNamespace(effect=SimpleNamespace(label=lambda: "spring"), share=0.25), "load")
@@ -355,7 +366,7 @@ def test_what_is_outweighed_by_an_unknown_rest_goes_and_is_told(monkeypatch: pyt
 
     def without_effect(evidence: Evidence, outcome: Any, effect: Any) -> Any:
         kept = [f for f in outcome.found if f is not effect]
-        return SimpleNamespace(name="fewer", found=kept, added=lambda: kept)
+        return SimpleNamespace(name="fewer", found=kept, added=lambda: kept, masked=())
 
     monkeypatch.setattr(module, "outweighed", outweighed)
     monkeypatch.setattr(module, "without_effect", without_effect)

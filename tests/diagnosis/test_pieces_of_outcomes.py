@@ -116,7 +116,8 @@ class TestOutcomes:
             found: Any = [
                 SimpleNamespace(effect=SimpleNamespace(name=kinds[name]), shape=name) for name in names
             ]
-            given: Any = SimpleNamespace(found=found, before=None, after=fitted(names))
+            nothing: Any = None
+            given = searching.Outcome(found, nothing, fitted(names))
             return "".join(f.shape for f in searching.clear(ANY_ARM, given, settled, alike).found)
 
         assert kept("a") == "a" and kept("c") == "" and kept("b") == ""
@@ -208,7 +209,7 @@ class TestOutcomes:
 
         def outweighed(*left: int, among: str = "ab") -> str | None:
             whole, nothing = self.outcome("a", "b"), None
-            given: Any = SimpleNamespace(found=whole.found, before=None, after=fitted("all"))
+            given = searching.Outcome(whole.found, nothing, fitted("all"))  # type: ignore[arg-type]
             asked = [f for f in whole.found if f.shape in among]
             found = searching.outweighed(nothing, given, asked, left, np.arange(202) < 200)  # type: ignore[arg-type]
             return None if found is None else str(found.shape)

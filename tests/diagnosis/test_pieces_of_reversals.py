@@ -274,7 +274,7 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
 
     told: list[str] = []
     after = SimpleNamespace(effects=(), shapes=())
-    outcome: Any = SimpleNamespace(found=["slide"], after=after, added=list)
+    outcome: Any = SimpleNamespace(found=["slide"], after=after, added=list, masked=("hidden",))
     found = judge_reversals(
         run(np.zeros((6, 2), dtype=bool)), outcome, np.ones((6, 2), dtype=bool), told.append
     )

@@ -45,8 +45,14 @@ class TestSearch:
     """Of what any set of effects leaves of a hundred rows, in twenty blocks."""
 
     @staticmethod
-    def search(monkeypatch: pytest.MonkeyPatch, left: dict[str, float], barred: tuple[str, ...] = ()) -> Any:
-        """A search in which sets of effects, joined by blanks in the order of their names, leave so much."""
+    def search(
+        monkeypatch: pytest.MonkeyPatch, left: dict[str, float], barred: tuple[str, ...] = (), **plain: float
+    ) -> Any:
+        """A search in which sets of effects, joined by blanks in the order of their names, leave so much.
+
+        Args:
+            plain: how many of a run's own standard errors effects are from zero; 0 where it is not said.
+        """
         every = sorted({name for names in left for name in names.split()})
 
         def of(names: Any) -> Any:
@@ -63,7 +69,11 @@ class TestSearch:
 
         def known(evidence: Any, found: Any) -> Any:
             names = [str(f.effect) for f in found]
-            return SimpleNamespace(names=names, fit=SimpleNamespace(score=of(names)))
+            shown = [plain.get(name, 0.0) for name in names]
+            added = [SimpleNamespace(effect=SimpleNamespace(joint=1), name=name) for name in names]
+            return SimpleNamespace(
+                names=names, fit=SimpleNamespace(score=of(names), shown=shown, added=lambda: added)
+            )
 
         model = SimpleNamespace(arm=None, friction=FrictionLaw(((),)))
         evidence: Any = SimpleNamespace(model=model, variation=np.array([1.0]))
@@ -217,6 +227,27 @@ class TestSearch:
                 monkeypatch.setattr(searching, rule, clear)
                 unclear.update(gone)
                 assert self.found(search) == named
+
+    def test_what_comes_near_an_effect_that_only_the_models_errors_make_unclear_is_none(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Viscous friction as it differs from log to log, and a drag that explains most of it, or something beside it."""
+
+        def clear(evidence: Any, outcome: Any) -> Any:
+            return replace(outcome, found=[f for f in outcome.found if f.effect != "viscous1"])
+
+        left = {"": 1000.0, "drag1": 150.0, "viscous1": 100.0}
+        for z, more, named in (
+            (2.9, {}, ["drag1"]),
+            (3.1, {}, []),
+            (3.1, {"drag1 viscous1": 20.0}, ["drag1"]),  # found before, beside the viscous friction
+            (3.1, {"coulomb1": 400.0, "coulomb1 viscous1": 20.0}, ["coulomb1"]),
+        ):
+            search = self.search(monkeypatch, left | more, viscous1=z)
+            monkeypatch.setattr(searching, "clear", clear)
+            outcome = search.outcome()
+            assert [f.effect for f in outcome.found] == named
+            assert [hidden.name for hidden in outcome.masked] == ["viscous1"] * (z > 3)
 
     def test_what_was_not_worth_it_beside_another_is_asked_again_without_that(
         self, monkeypatch: pytest.MonkeyPatch

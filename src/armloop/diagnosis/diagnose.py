@@ -20,7 +20,15 @@ from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.onset import account_with_onsets
-from armloop.diagnosis.reasons import Standing, event_in_doubt, event_untold, in_doubt, standing, too_still
+from armloop.diagnosis.reasons import (
+    Standing,
+    event_in_doubt,
+    event_untold,
+    in_doubt,
+    masked,
+    standing,
+    too_still,
+)
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.score import mean_by_joint, ratio
 from armloop.diagnosis.search import (
@@ -286,6 +294,12 @@ def diagnose(
     return replace(found, standing=stand, zeros=zeros)
 
 
+def _is_left(effect: Effect, outcome: Outcome, left: Sequence[int]) -> bool:
+    """Whether an effect is not stated, and acts on a joint (0-based) of which something is left."""
+    stated = {found.effect.place for found in outcome.found}
+    return effect.place not in stated and bool(set(effect.indices) & set(left))
+
+
 def _by_events_alone(
     whole: Evidence, contacts: list[Contact], progress: Progress, jobs: int | None
 ) -> Diagnosis:
@@ -373,5 +387,6 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             break
         doubted += [event_in_doubt(each.added) for each in drowning]
         contacts = [each for each in contacts if each not in drowning]
+    doubted += [masked(each) for each in outcome.masked if _is_left(each.effect, outcome, stand.left)]
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))

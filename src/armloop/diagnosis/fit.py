@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -107,8 +107,17 @@ class Fit:
 
         What would be another law by itself does not count. Of columns that are alike none need be clear by itself.
         """
+        return self._clear(self._spread)
+
+    @cached_property
+    def shown(self) -> tuple[float, ...]:
+        """The same by what this run shows alone, as if the coefficients of the model were without error."""
+        exact = replace(self.stacked, model_errors=self.stacked.model_errors[:, :0])
+        return self._clear(self._spread_of(exact))
+
+    def _clear(self, spreads: Sequence[Array]) -> tuple[float, ...]:
         each = []
-        for effect, free, spread in zip(self.effects, self.solution.free, self._spread, strict=True):
+        for effect, free, spread in zip(self.effects, self.solution.free, spreads, strict=True):
             own = slice(len(free) - effect.nested)
             clearest = np.max(np.abs(free[own]) / np.sqrt(np.diag(spread)[own] + TINY), initial=0.0)
             each.append(max(float(clearest), deviate(*_wald(free[own], spread[own, own]))))
@@ -125,7 +134,10 @@ class Fit:
     @cached_property
     def _spread(self) -> list[Array]:
         """Covariance of each effect's free parameters."""
-        rows, (beta, free, J, _) = self.stacked, self.solution
+        return self._spread_of(self.stacked)
+
+    def _spread_of(self, rows: Stacked) -> list[Array]:
+        beta, free, J, _ = self.solution
         whole = covariance(rows.X @ J, rows.y - rows.X @ beta, rows)
         ends = np.cumsum([len(own) for own in free])
         blocks = (slice(end - len(own), end) for own, end in zip(free, ends, strict=True))

@@ -132,6 +132,14 @@ def in_doubt(label: str, share: float) -> str:
     )
 
 
+def masked(added: AddedEffect) -> str:
+    """A sentence on an effect that is plain in the run, but no larger than what the model itself may err by."""
+    return (
+        f"{added.effect.label()} would explain some of what is left there, but is no larger than what the model's own "
+        "coefficients may be wrong by, friction that differs from log to log among them: it is not stated"
+    )
+
+
 def part_of_a_law(labels: Sequence[str], joint: int, share: float, times: float) -> str:
     """A sentence on effects that explain a part (of the energy) of what a law does, and leave so many times more (RMS)."""
     return (

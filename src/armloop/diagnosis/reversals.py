@@ -110,7 +110,7 @@ def judge_reversals(
     if not found:
         return None
     after = Known.of(own, known.fit.effects, known.fit.shapes).fit
-    every = Outcome([*outcome.found, *found], Known.of(own).fit, after)
+    every = Outcome([*outcome.found, *found], Known.of(own).fit, after, outcome.masked)
     whole = clear(own, every, settled=len(outcome.found), alike=True)
     found = whole.found[len(outcome.found) :]
     if not found:

@@ -24,6 +24,7 @@ from armloop.diagnosis.judgement import (
     times_enough,
 )
 from armloop.diagnosis.lasting import much_lasts
+from armloop.diagnosis.masking import masked, stand_in
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Hypotheses, Known, Tried
 from armloop.laws.effects import Effect, hypotheses
@@ -85,11 +86,16 @@ class Strength:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What the search found: accepted effects, and the fits without and with them."""
+    """What the search found: accepted effects, and the fits without and with them.
+
+    Attributes:
+        masked: effects that are plain in the run, but no larger than what the model itself may err by.
+    """
 
     found: list[Found]
     before: Fit
     after: Fit
+    masked: tuple[AddedEffect, ...] = ()
 
     def added(self) -> list[AddedEffect]:
         """The effects with their parameters, ready to be composed with the model."""
@@ -157,16 +163,37 @@ class _Search:
             return outcome
         # What is not clear may have stood in the way of a simpler law that is: columns nearly alike share one torque.
         self.progress(f"not sure: {', '.join(e.label() for e in unclear)}; searching without")
+        hidden = masked(self._known(found).fit, found, unclear)
         barred, self.barred = self.barred, [*self.barred, *(effect.place for effect in unclear)]
-        outcome = self.outcome()
+        outcome = self._without_stand_ins(self.outcome(), found, [f for f, _ in hidden])
+        # of those of one joint the likeliest is told, not what is sought in its place
+        mine = {added.effect.joint for _, added in hidden}
+        elsewhere = (added for added in outcome.masked if added.effect.joint not in mine)
+        outcome = replace(outcome, masked=(*(added for _, added in hidden), *elsewhere))
         # What was barred beside others may be worth it, and clear, beside what is there now.
         self.barred = barred
         value = log_posterior(self.evidence, outcome.after.score, [f.effect for f in outcome.found])
         steps = [step for step in self._additions(outcome.found) if step[1][-1].effect in unclear]
         for likely, more in sorted(steps, key=lambda step: -step[0]):
             if likely > value + _LEAST and len((again := self._settled(more)).found) == len(more):
-                return again
+                return replace(again, masked=outcome.masked)
         return outcome
+
+    def _without_stand_ins(self, outcome: Outcome, before: list[Found], masking: list[Found]) -> Outcome:
+        """The outcome of a search without effects that are none beside what the model itself may err by."""
+        while (f := stand_in(outcome.found, before, masking, self._gained)) is not None:
+            self.progress(f"{f.effect.label()} is nothing beside what the model itself errs by")
+            self.barred = [*self.barred, f.effect.place]
+            outcome = self.outcome()
+        return outcome
+
+    def _gained(self, others: list[Found], f: Found) -> float:
+        """Log posterior odds of an effect beside others, less the least that a step is worth."""
+        without, beside = (
+            log_posterior(self.evidence, self._known(each).fit.score, [one.effect for one in each])
+            for each in (others, [*others, f])
+        )
+        return beside - without - _LEAST
 
     def _settled(self, found: list[Found]) -> Outcome:
         """A set of effects without what is not worth it or not clear of its error."""
@@ -252,7 +279,7 @@ def _others(found: Sequence[Found], k: int) -> list[Found]:
 
 def _with_only(evidence: Evidence, outcome: Outcome, found: list[Found]) -> Outcome:
     """The outcome with these of its effects, fitted again."""
-    return Outcome(found, outcome.before, _known(evidence, found).fit)
+    return replace(outcome, found=found, after=_known(evidence, found).fit)
 
 
 def refitted(evidence: Evidence, outcome: Outcome) -> Outcome:
@@ -267,7 +294,7 @@ def with_effects(evidence: Evidence, outcome: Outcome, more: Sequence[Found]) ->
     for k in range(len(outcome.found), len(found)):
         gained = gain(_known(evidence, _others(found, k)).fit.score, after.score)
         found[k] = replace(found[k], share=min(gained / whole, 1.0))
-    return Outcome(found, outcome.before, after)
+    return replace(outcome, found=found, after=after)
 
 
 def strengths(evidence: Evidence, outcome: Outcome) -> list[Strength]:
