@@ -325,6 +325,7 @@ def test_of_equals_the_simplest_is_named_and_the_others_are_alternatives(model: 
     assert "larger range" in rivals["joint_spring", 2]
 
 
+@pytest.mark.long
 def test_a_reconstructed_model_serves_as_well_as_an_exact_one() -> None:
     logs = [run(None, seed, seconds=40.0) for seed in (21, 22)]
     reconstructed = reconstruct(logs, three_axis(), library="rigid-body").model

@@ -84,6 +84,7 @@ def test_the_augmented_model_has_it_from_then_on(
     assert kept.feedforward(q, v, vdot)[1] - model.feedforward(q, v, vdot)[1] > 0.1
 
 
+@pytest.mark.long
 def test_an_encoder_that_slips_is_one_offset_since_then(model: ReconstructedModel) -> None:
     found = diagnose(model, [slipped(2, 18.0, 0.03)], jobs=1)
     assert found.named == [("encoder_offset", 2)] and not found.contacts

@@ -63,9 +63,15 @@ def test_the_load_is_a_payload_of_its_mass(
         for path in (model, augmented)
     )
     assert np.mean(after) <= 0.055 < 0.3 <= np.mean(before)
-    again = answer(
-        capsys, ["diagnose", str(augmented), str(ur10e / LOADED), "--out", str(tmp_path / "again")]
-    )
+
+
+@pytest.mark.long
+def test_with_the_load_in_the_model_nothing_is_left_to_find(
+    model: Path, ur10e: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(capsys, ["diagnose", str(model), str(ur10e / LOADED), "--out", str(tmp_path)])
+    augmented = str(tmp_path / "model.json")
+    again = answer(capsys, ["diagnose", augmented, str(ur10e / LOADED), "--out", str(tmp_path / "again")])
     assert again["verdict"] == "no_effect"
 
 

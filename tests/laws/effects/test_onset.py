@@ -82,3 +82,18 @@ def test_its_words_have_the_digits_of_its_error() -> None:
     onset = Onset(31.2345, 0.42, False, (0.0,), log="run_1")
     assert onset.words() == "since 31.2 ± 0.4 s of run_1"
     assert replace(onset, error=0.0234, until=True, log="").words() == "until 31.23 ± 0.02 s"
+
+
+def test_a_sensors_remedy_goes_for_what_was_recorded_then() -> None:
+    onset = Onset(31.2345, 0.42, False, (0.0,), log="run_1")
+    offset = {"offset": Estimate(0.03, 0.001, "rad")}
+    slipped, whole = (
+        AddedEffect(
+            effect("encoder_offset", 2) if when is None else effect("encoder_offset", 2).within(when), offset
+        )
+        for when in (onset, None)
+    )
+    assert (
+        slipped.remedy() == f"{whole.remedy()}. This goes for what was recorded since 31.2 ± 0.4 s of run_1"
+    )
+    assert added(onset).remedy() == ""  # what acts on the arm itself
