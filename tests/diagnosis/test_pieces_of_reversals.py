@@ -289,6 +289,7 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     whole: Any = found.outcome.every  # type: ignore[attr-defined]
     assert whole[0][0] == "slide" and len(whole[0]) == 3
     assert whole[1].effects == () and [e.joint for e in whole[2].effects] == [1, 2]
+    assert whole[3] == ("hidden",)
     assert found.evidence.rows.all() and len(told) == 2
     # what is not clear of its stated error goes, and if nothing is left there is nothing to say
     nobody, everybody = np.zeros((6, 2), dtype=bool), np.ones((6, 2), dtype=bool)

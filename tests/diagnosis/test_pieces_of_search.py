@@ -249,6 +249,15 @@ class TestSearch:
             assert [f.effect for f in outcome.found] == named
             assert [hidden.name for hidden in outcome.masked] == ["viscous1"] * (z > 3)
 
+    def test_of_what_is_hidden_at_a_joint_the_likeliest_is_told(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Not the drag that is sought in the place of viscous friction, and is hidden, too."""
+        left = {"": 1000.0, "drag1": 150.0, "viscous1": 100.0}
+        search = self.search(monkeypatch, left, viscous1=3.1, drag1=3.1)
+        monkeypatch.setattr(searching, "clear", lambda evidence, outcome: replace(outcome, found=[]))
+        assert [hidden.name for hidden in search.outcome().masked] == ["viscous1"]
+
     def test_what_was_not_worth_it_beside_another_is_asked_again_without_that(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -258,6 +258,22 @@ class TestInterval:
         assert self.found(slice(20, 36), 0.04, starts=(0, 20), _20=1.1) == (20, 40)
 
 
+def test_a_torque_explains_most_of_its_joint_or_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+
+    def trial(evidence: Any, residual: Any, weight: Any, burst: slice, kind: Any, shown: list[int]) -> Any:
+        asked.append((weight[0].tolist(), kind.effect.place, shown))
+        return answers[len(asked) - 1]
+
+    answers = [SimpleNamespace(own=0.5), SimpleNamespace(own=0.49), None]
+    monkeypatch.setattr(pushes, "_trial", trial)
+    evidence: Any = SimpleNamespace(scale=np.array([2.0, 4.0]))
+    for named in (answers[0], None, None):
+        found = pushes.torque_on(evidence, np.zeros((1, 2)), slice(0, 1), np.array([[False, True]]), 1)
+        assert found is named
+    assert asked == [([0.0, 0.25], ("external_torque", 2, None), [1])] * 3
+
+
 class TestBestInterval:
     """A burst from sample 20 to 79 that is low but for a pulse of ten samples, or of which all is as high."""
 
