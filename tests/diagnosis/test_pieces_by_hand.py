@@ -17,6 +17,7 @@ from armloop.diagnosis import (
     evidence,
     innovations,
     judgement,
+    outcomes,
     planning,
     reversals,
     search,
@@ -79,7 +80,7 @@ class TestSearch:
         given: Any = SimpleNamespace(columns=lambda effect, shape: columns, scale=np.ones(2))
         effect: Any = SimpleNamespace(joint=None)
         shape: Any = SimpleNamespace(final=0.0)
-        assert [search._acts_mainly_on(given, effect, shape, j) for j in (0, 1)] == [False, True]
+        assert [outcomes._acts_mainly_on(given, effect, shape, j) for j in (0, 1)] == [False, True]
 
 
 class TestTrials:

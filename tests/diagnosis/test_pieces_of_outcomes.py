@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armloop.diagnosis import search as searching
+from armloop.diagnosis import outcomes
 from armloop.laws.effects import effect
 
 ANY_ARM: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
@@ -22,14 +22,14 @@ class TestOutcomes:
     def outcome(*names: str) -> Any:
         effects = [SimpleNamespace(place=name, other_joint=2 if name in "xyz" else None) for name in names]
         found = [SimpleNamespace(effect=e, shape=name) for e, name in zip(effects, names, strict=True)]
-        return searching.Outcome(found, None, SimpleNamespace(score="all"))  # type: ignore[arg-type]
+        return outcomes.Outcome(found, None, SimpleNamespace(score="all"))  # type: ignore[arg-type]
 
     @pytest.fixture(autouse=True)
     def known(self, monkeypatch: pytest.MonkeyPatch) -> None:
         def names(evidence: Any, found: Any) -> Any:
             return SimpleNamespace(fit=SimpleNamespace(score="".join(f.shape for f in found)))
 
-        monkeypatch.setattr(searching, "_known", names)
+        monkeypatch.setattr(outcomes, "known_with", names)
 
     def test_what_is_worth_nothing_beside_the_others_goes_the_first_first(
         self, monkeypatch: pytest.MonkeyPatch
@@ -38,11 +38,11 @@ class TestOutcomes:
 
         def kept(worth: dict[tuple[str, str, int], bool], *names: str) -> str:
             monkeypatch.setattr(
-                searching,
+                outcomes,
                 "is_worth",
                 lambda e, others, after, joints, effect: worth.get((others, after, joints), True),
             )
-            made = searching.pruned(nothing, self.outcome(*names))
+            made = outcomes.pruned(nothing, self.outcome(*names))
             return "".join(f.shape for f in made.found)
 
         assert kept({}, "a", "b", "c") == "abc"
@@ -68,14 +68,14 @@ class TestOutcomes:
             )
 
         monkeypatch.setattr(
-            searching,
-            "_known",
+            outcomes,
+            "known_with",
             lambda evidence, found: SimpleNamespace(fit=fitted("".join(f.shape for f in found))),
         )
 
         def kept(*names: str, settled: int = 0) -> tuple[str, Any]:
             given = replace(self.outcome(*names), after=fitted("".join(names)))
-            made = searching.clear(ANY_ARM, given, settled)
+            made = outcomes.clear(ANY_ARM, given, settled)
             return "".join(f.shape for f in made.found), made.after.clear
 
         assert kept("a", "b", "c") == ("ac", (3.0, 3.1))
@@ -107,8 +107,8 @@ class TestOutcomes:
             return SimpleNamespace(clear=(0.5,) * len(names), wald=chi, effects=effects, parameters=names)
 
         monkeypatch.setattr(
-            searching,
-            "_known",
+            outcomes,
+            "known_with",
             lambda evidence, found: SimpleNamespace(fit=fitted("".join(f.shape for f in found))),
         )
 
@@ -117,8 +117,8 @@ class TestOutcomes:
                 SimpleNamespace(effect=SimpleNamespace(name=kinds[name]), shape=name) for name in names
             ]
             nothing: Any = None
-            given = searching.Outcome(found, nothing, fitted(names))
-            return "".join(f.shape for f in searching.clear(ANY_ARM, given, settled, alike).found)
+            given = outcomes.Outcome(found, nothing, fitted(names))
+            return "".join(f.shape for f in outcomes.clear(ANY_ARM, given, settled, alike).found)
 
         assert kept("a") == "a" and kept("c") == "" and kept("b") == ""
         assert kept("a", alike=False) == ""
@@ -132,10 +132,10 @@ class TestOutcomes:
     def test_the_strength_of_an_effect_is_what_the_others_leave(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(searching, "times_enough", lambda evidence, others, after: f"{others} {after}")
-        monkeypatch.setattr(searching, "lead", lambda others, after: f"{after} {others}")
+        monkeypatch.setattr(outcomes, "times_enough", lambda evidence, others, after: f"{others} {after}")
+        monkeypatch.setattr(outcomes, "lead", lambda others, after: f"{after} {others}")
         nothing: Any = None
-        found = searching.strengths(nothing, self.outcome("a", "b", "c"))
+        found = outcomes.strengths(nothing, self.outcome("a", "b", "c"))
         assert [(s.times, s.errors) for s in found] == [
             ("bc all", "all bc"),
             ("ac all", "all ac"),
@@ -147,21 +147,21 @@ class TestOutcomes:
         outcome = self.outcome("a", "b", "c")
         for found, share in zip(outcome.found, (0.2, 0.5, 0.3), strict=True):
             found.share = share
-        made = searching.strongest_first(nothing, outcome)
+        made = outcomes.strongest_first(nothing, outcome)
         assert [f.shape for f in made.found] == ["b", "c", "a"]
-        assert vars(made.after) == {"score": "bca"} and searching.strongest_first(nothing, made) is made
+        assert vars(made.after) == {"score": "bca"} and outcomes.strongest_first(nothing, made) is made
 
     def test_effects_beside_which_the_others_leave_no_more_go_the_worst_first(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(searching, "lead", lambda others, after: 0.0)
+        monkeypatch.setattr(outcomes, "lead", lambda others, after: 0.0)
         nothing: Any = None
 
         def kept(times: dict[tuple[str, str], float], *names: str) -> str:
             monkeypatch.setattr(
-                searching, "times_enough", lambda e, others, after: times.get((others, after), 1.0)
+                outcomes, "times_enough", lambda e, others, after: times.get((others, after), 1.0)
             )
-            return "".join(f.shape for f in searching.useful(nothing, self.outcome(*names)).found)
+            return "".join(f.shape for f in outcomes.useful(nothing, self.outcome(*names)).found)
 
         assert kept({}, "a", "b", "c") == "abc" and kept({}) == ""
         assert kept({("bc", "all"): -1.0, ("ac", "all"): -2.0}, "a", "b", "c") == "ac"
@@ -171,9 +171,9 @@ class TestOutcomes:
     def test_a_law_that_goes_beside_one_that_holds_it_is_what_that_may_be(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(searching, "lead", lambda others, after: 0.0)
+        monkeypatch.setattr(outcomes, "lead", lambda others, after: 0.0)
         monkeypatch.setattr(
-            searching, "times_enough", lambda e, others, after: -1.0 if others == "bcde" else 1.0
+            outcomes, "times_enough", lambda e, others, after: -1.0 if others == "bcde" else 1.0
         )
         laws = (("coulomb_friction", 2), ("presliding_hysteresis", 2), ("presliding_hysteresis", 1))
         laws += (("viscous_friction", 2), ("torque_drift", 2))
@@ -182,8 +182,8 @@ class TestOutcomes:
             for law, name in zip(laws, "abcde", strict=True)
         ]
         nothing: Any = None
-        outcome = searching.Outcome(found, nothing, SimpleNamespace(score="all"))  # type: ignore[arg-type]
-        made = searching.useful(nothing, outcome)
+        outcome = outcomes.Outcome(found, nothing, SimpleNamespace(score="all"))  # type: ignore[arg-type]
+        made = outcomes.useful(nothing, outcome)
         assert [f.shape for f in made.found] == list("bcde")
         assert [len(f.rivals) for f in made.found] == [1, 0, 0, 0]
         assert [(e.place, share) for e, share in made.found[0].rivals] == [(found[0].effect.place, 0.9)]
@@ -202,16 +202,16 @@ class TestOutcomes:
             return SimpleNamespace(stacked=rows, held_out=np.append(held_out, [99.0, 99.0]))
 
         monkeypatch.setattr(
-            searching,
-            "_known",
+            outcomes,
+            "known_with",
             lambda evidence, found: SimpleNamespace(fit=fitted("".join(f.shape for f in found))),
         )
 
         def outweighed(*left: int, among: str = "ab") -> str | None:
             whole, nothing = self.outcome("a", "b"), None
-            given = searching.Outcome(whole.found, nothing, fitted("all"))  # type: ignore[arg-type]
+            given = outcomes.Outcome(whole.found, nothing, fitted("all"))  # type: ignore[arg-type]
             asked = [f for f in whole.found if f.shape in among]
-            found = searching.outweighed(nothing, given, asked, left, np.arange(202) < 200)  # type: ignore[arg-type]
+            found = outcomes.outweighed(nothing, given, asked, left, np.arange(202) < 200)  # type: ignore[arg-type]
             return None if found is None else str(found.shape)
 
         # 399 of the second joint, of which 400 are left beyond its baseline; what is noise there is no rest
@@ -229,13 +229,13 @@ class TestOutcomes:
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(
-            searching, "_acts_mainly_on", lambda evidence, effect, shape, joint: shape == "abc"[joint]
+            outcomes, "_acts_mainly_on", lambda evidence, effect, shape, joint: shape == "abc"[joint]
         )
         nothing: Any = None
         whole = self.outcome("a", "b")
-        bare = searching.without_effects_at(nothing, whole, 0)
+        bare = outcomes.without_effects_at(nothing, whole, 0)
         assert [f.shape for f in bare.found] == ["b"] and bare.after.score == "b"  # type: ignore[comparison-overlap]
-        assert searching.without_effects_at(nothing, whole, 2) is whole
+        assert outcomes.without_effects_at(nothing, whole, 2) is whole
 
 
 def test_the_joint_that_an_effect_acts_on_above_all() -> None:
@@ -245,7 +245,7 @@ def test_the_joint_that_an_effect_acts_on_above_all() -> None:
         columns=lambda effect, shape: columns * shape, scale=np.array([2.0, 1.0, 2.0])
     )
     shape: Any = SimpleNamespace(final=1.0)
-    of = searching._acts_mainly_on
+    of = outcomes._acts_mainly_on
     assert [of(evidence, effect("payload", None), shape, j) for j in range(3)] == [False, True, False]
     assert [of(evidence, effect("joint_spring", 3), shape, j) for j in range(3)] == [False, False, True]
     pair = effect("transmission_coupling", 1, 3)

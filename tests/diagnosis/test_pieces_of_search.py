@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scores import score
 
+from armloop.diagnosis import outcomes
 from armloop.diagnosis import search as searching
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import much_is_left
@@ -78,8 +79,8 @@ class TestSearch:
         model = SimpleNamespace(arm=None, friction=FrictionLaw(((),)))
         evidence: Any = SimpleNamespace(model=model, variation=np.array([1.0]))
         monkeypatch.setattr(searching, "hypotheses", lambda arm: ["any"] * 10)
-        monkeypatch.setattr(searching, "_known", known)
-        monkeypatch.setattr(searching, "_nested", lambda effect, law: False)
+        monkeypatch.setattr(searching, "known_with", known)
+        monkeypatch.setattr(outcomes, "_nested", lambda effect, law: False)
         monkeypatch.setattr(searching.Known, "of", staticmethod(lambda evidence: known(evidence, [])))
         monkeypatch.setattr(searching, "clear", lambda evidence, outcome: outcome)
         monkeypatch.setattr(searching, "pruned", lambda evidence, outcome: outcome)
@@ -196,9 +197,9 @@ class TestSearch:
         known: Any = SimpleNamespace(
             trial=lambda of: SimpleNamespace(shapes=[Shape.fixed(0.0)]) if of is plain else None, fit=None
         )
-        monkeypatch.setattr(searching, "_known", lambda _, found: known)
-        outcome: Any = searching.Outcome([other, richer], None, None)  # type: ignore[arg-type]
-        first, one = searching.plainest(evidence, outcome, [richer] if among else []).found
+        monkeypatch.setattr(outcomes, "known_with", lambda _, found: known)
+        outcome: Any = outcomes.Outcome([other, richer], None, None)  # type: ignore[arg-type]
+        first, one = outcomes.plainest(evidence, outcome, [richer] if among else []).found
         assert first is other and one.effect.name.startswith(named) and one.always
         if named == "coulomb":
             assert (one.share, one.shape) == (share, Shape.fixed(0.0))

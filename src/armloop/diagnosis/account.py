@@ -20,8 +20,9 @@ from armloop.diagnosis.judgement import (
     lead,
     much_is_left,
 )
+from armloop.diagnosis.outcomes import Outcome, without_effects_at
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.search import Outcome, search, without_effects_at
+from armloop.diagnosis.search import search
 from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.laws.effects import Effect

@@ -13,7 +13,7 @@ from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.contacts import find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import gain, leaves_more, soaked
-from armloop.diagnosis.search import Found, Outcome, clear, pruned
+from armloop.diagnosis.outcomes import Found, Outcome, clear, pruned
 from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.model import AddedEffect
 from armloop.util.arrays import Mask

@@ -26,7 +26,8 @@ from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import MOSTLY, much_is_left
-from armloop.diagnosis.search import ROUNDS, Found
+from armloop.diagnosis.outcomes import Found
+from armloop.diagnosis.search import ROUNDS
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
 from armloop.laws.effects.payload import Payload

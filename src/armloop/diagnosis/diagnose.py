@@ -20,18 +20,7 @@ from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.onset import account_with_onsets
-from armloop.diagnosis.reasons import (
-    Standing,
-    event_in_doubt,
-    event_untold,
-    in_doubt,
-    masked,
-    standing,
-    too_still,
-)
-from armloop.diagnosis.reversals import AtReversals, judge_reversals
-from armloop.diagnosis.score import mean_by_joint, ratio
-from armloop.diagnosis.search import (
+from armloop.diagnosis.outcomes import (
     Found,
     Outcome,
     Strength,
@@ -43,6 +32,17 @@ from armloop.diagnosis.search import (
     useful,
     without_effect,
 )
+from armloop.diagnosis.reasons import (
+    Standing,
+    event_in_doubt,
+    event_untold,
+    in_doubt,
+    masked,
+    standing,
+    too_still,
+)
+from armloop.diagnosis.reversals import AtReversals, judge_reversals
+from armloop.diagnosis.score import mean_by_joint, ratio
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted, without_law
 from armloop.diagnosis.whereabouts import whereabouts

@@ -21,7 +21,8 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import enough, gain, is_worth
 from armloop.diagnosis.law_selection import library_of, names_of
-from armloop.diagnosis.search import ALTERNATIVE, MOST_EFFECTS, ROUNDS, Found, told
+from armloop.diagnosis.outcomes import Found
+from armloop.diagnosis.search import ALTERNATIVE, MOST_EFFECTS, ROUNDS, told
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.found import RANGE

@@ -31,8 +31,8 @@ from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY, NOTICEABLE, SIGNIFICANCE
+from armloop.diagnosis.outcomes import Found, Outcome, clear
 from armloop.diagnosis.score import mean_by_joint
-from armloop.diagnosis.search import Found, Outcome, clear
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.robot.arm import Arm

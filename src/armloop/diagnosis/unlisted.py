@@ -27,17 +27,10 @@ from armloop.diagnosis.judgement import (
 )
 from armloop.diagnosis.lasting import FEWEST, lasting
 from armloop.diagnosis.law_selection import Law, LawSelection, law_left, library_of, names_of
+from armloop.diagnosis.outcomes import Found, Outcome, pruned, with_effects, without_effects_at
 from armloop.diagnosis.reasons import part_of_a_law
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.search import (
-    Found,
-    Outcome,
-    log_prior,
-    pruned,
-    told,
-    with_effects,
-    without_effects_at,
-)
+from armloop.diagnosis.search import log_prior, told
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law, hypotheses
 from armloop.laws.effects.found import RANGE

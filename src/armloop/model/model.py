@@ -383,7 +383,7 @@ def model_of(data: Any, where: str) -> ReconstructedModel:
         ModelError, ArmError: as of :func:`load_model`.
     """
     # Here, for a command that only says what it can do should not wait for descriptions of files.
-    from armloop.schemas.model import model_data
+    from armloop.schemas.model_file import model_data
 
     try:
         return _from_dict(model_data(data))

@@ -76,6 +76,10 @@ def test_a_model_file_keeps_it(until: bool) -> None:
     data["effects"][0]["until" if until else "since"]["posture"] = [0.0]
     with pytest.raises(ModelError, match="posture: 1 joints, the arm has 3"):
         model_of(data, "model.json")
+    data = json.loads(json.dumps(model.to_dict()))
+    data["effects"][0] |= {word: model.effects[0].effect.onset.to_model() for word in ("since", "until")}
+    with pytest.raises(ModelError, match=r"effects\[1\]: has since and until"):
+        model_of(data, "model.json")
 
 
 def test_its_words_have_the_digits_of_its_error() -> None:
