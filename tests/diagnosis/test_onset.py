@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from synthetic import measured
 
 from armloop.data.log import MotionLog
 from armloop.data.signals import preprocess
-from armloop.diagnosis import Diagnosis, diagnose
+from armloop.diagnosis import Diagnosis, diagnose, onset
 from armloop.diagnosis.change_points import ChangePoints, Part
 from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
@@ -202,3 +204,35 @@ def test_of_several_logs_the_one_that_it_begins_in_is_found(model: Reconstructed
     assert not best.until and not best.elsewhere and abs(onset.time - 9.0) < 1.0
     motion = points.evidence.samples.motion
     assert not onset.there(motion)[: motion.starts[1]].any()
+
+
+@pytest.mark.parametrize(
+    ("likely", "worth", "gradual", "of_motion", "told"),
+    [
+        (1.0, True, False, False, True),
+        (-1.0, True, False, False, False),  # what was found without it is likelier
+        (1.0, False, False, False, False),  # the same effect all the while is as good
+        (1.0, True, True, False, False),
+        (1.0, True, False, True, False),
+    ],
+)
+def test_it_must_be_likelier_than_all_else_worth_more_than_all_the_while_and_of_time_alone(
+    likely: float, worth: bool, gradual: bool, of_motion: bool, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = np.ones((4, 3), dtype=bool)
+    evidence = SimpleNamespace(rows=rows)
+    part = SimpleNamespace(effect=effect("coulomb_friction", 2), shape=Shape.fixed(0.0), others=())
+    judged: Any = SimpleNamespace(
+        known=SimpleNamespace(evidence=evidence), part=part, cut=7, likely=likely, score=lambda rows: "gated"
+    )
+    points: Any = SimpleNamespace(
+        gradual=lambda *asked: asked == (part, 7) and gradual, of_motion=lambda *asked: of_motion
+    )
+    constant = SimpleNamespace(fit=SimpleNamespace(score="constant"))
+    monkeypatch.setattr(onset.Known, "of", staticmethod(lambda *given: constant))
+    monkeypatch.setattr(
+        onset, "is_worth", lambda _, plain, gated, *rest: (plain, gated) == ("constant", "gated") and worth
+    )
+    monkeypatch.setattr(onset, "_posterior", lambda account, residual, rows: 0.0)
+    account: Any = SimpleNamespace(contacts=[], evidence=evidence)
+    assert onset._is_told(points, judged, account, np.zeros((4, 3))) == told

@@ -14,8 +14,8 @@ from armloop.util.arrays import Array
 _LEAST = 1e-3
 #: It is so many times what is usual in the log, and what is left of any other sample within so many seconds.
 _UNUSUAL, _NEARBY, _AROUND = 30.0, 10.0, 0.5
-#: It lasts if most of it is still there after so many samples: what is repaired by the next ones is a lost sample.
-_LASTS, _MOST = 5, 0.5
+#: So many samples at least lie before it and after it, and two joints that step within as many do so together.
+_LASTS = 5
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,5 @@ def _step(time: Array, left: Array) -> int | None:
         return None
     near = np.abs(time - time[k]) <= _AROUND
     near[k] = False
-    if size < _NEARBY * np.abs(left[near]).max(initial=0.0):
-        return None
-    stays = float(left[k - _LASTS : k + _LASTS + 1].sum()) / float(left[k])
-    return k if stays > _MOST else None
+    # what is repaired by the next samples, such as a lost one, is followed by steps as large
+    return k if size >= _NEARBY * np.abs(left[near]).max(initial=0.0) else None
