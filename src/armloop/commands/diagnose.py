@@ -20,7 +20,7 @@ class Diagnose(HeldOut, OfModel, NextRun, Json):
         "and fades outside of that"
     )
     jobs: int | None = processes(
-        "try the hypotheses (default: one per core, at most four); the answer does not depend on it"
+        "try the hypotheses, and draw the report (default: one per core, at most four); the answer does not depend on it"
     )
 
 
@@ -46,7 +46,7 @@ def run(options: Diagnose) -> None:
     if planned is not None:
         answer["next_run"] = planned.to_dict()
     progress(options)("drawing the report")
-    page = diagnosis_report(result, model, [log.name for log in logs], compensation)
+    page = diagnosis_report(result, model, [log.name for log in logs], compensation, options.jobs)
     write_json(folder / "diagnosis.json", answer)
     result.model.save(folder / "model.json")
     write_text(folder / "report.html", page)

@@ -92,8 +92,9 @@ def diagnosis_report(
     model: ReconstructedModel,
     log_names: Sequence[str],
     compensation: Closing | None = None,
+    jobs: int | None = None,
 ) -> str:
-    """One HTML page on a diagnosis; ``model`` is the model before, without the effects."""
+    """One HTML page on a diagnosis; ``model`` is the model before, without the effects, ``jobs`` as of :func:`render`."""
     found = [one.effect for one in diagnosis.outcome.found]
     say = Prose(
         "diagnosis",
@@ -114,7 +115,8 @@ def diagnosis_report(
             say["lead"],
             [*sections, models],
             diagnosis_cards(diagnosis),
-        )
+        ),
+        jobs,
     )
 
 

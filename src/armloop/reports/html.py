@@ -23,6 +23,7 @@ from armloop.reports.plots.narrow import stack
 from armloop.reports.plots.style import GRID, INK, MUTED, SURFACE
 from armloop.reports.tables import Table
 from armloop.reports.words import spelled
+from armloop.util.workers import Processes, team_size
 
 _THEME = {INK: "var(--ink)", MUTED: "var(--muted)", GRID: "var(--grid)", SURFACE: "var(--surface)"}
 _DPI = 150
@@ -115,12 +116,20 @@ class Report:
     hero: Picture | None = None
 
 
-def render(report: Report) -> str:
-    """Render a report as one self-contained HTML page."""
+def render(report: Report, jobs: int | None = None) -> str:
+    """Render a report as one self-contained HTML page, its figures drawn side by side.
+
+    Args:
+        jobs: in how many processes, as of :func:`armloop.util.workers.team_size`.
+    """
+    pictures = [picture for section in report.sections for picture in section.pictures]
+    pictures += [report.hero] if report.hero else []
+    texts = Processes(team_size(jobs)).map(Picture.svg, pictures)
+    drawn = {id(picture): text for picture, text in zip(pictures, texts, strict=True)}
     environment = Environment(
         loader=PackageLoader("armloop.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["svg"] = lambda picture: Markup(picture.svg())
+    environment.filters["svg"] = lambda picture: Markup(drawn[id(picture)])
     environment.filters["prose"] = prose
     environment.filters["parted"] = parted
     environment.tests["wide"] = wide

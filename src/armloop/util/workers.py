@@ -116,16 +116,21 @@ def _die_with(parent: int) -> None:
         os._exit(1)
 
 
+def team_size(jobs: int | None = None) -> int:
+    """How many processes work together: all cores by default, up to :data:`_TEAM`; within another pool's, this one alone."""
+    return 1 if _forked else jobs or min(len(os.sched_getaffinity(0)), _TEAM)
+
+
 class Team:
     """Forked processes that keep what they have computed: of every list each does the same share.
 
     Args:
         held: what every process has; inherited, so it need not be picklable.
-        jobs: how many; all cores by default, up to :data:`_TEAM`; within another pool's process this one alone.
+        jobs: how many, as of :func:`team_size`.
     """
 
     def __init__(self, held: Any, jobs: int | None = None) -> None:
-        self.jobs = 1 if _forked else jobs or min(len(os.sched_getaffinity(0)), _TEAM)
+        self.jobs = team_size(jobs)
         self._held = held
         if self.jobs > 1:
             fork = get_context("fork")
