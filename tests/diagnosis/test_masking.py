@@ -1,4 +1,4 @@
-"""Which effects stand in for one that only the model's own errors hide."""
+"""Which effects only the model's own errors hide, and which stand in for one of these."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from armloop.diagnosis.masking import stand_in
+from armloop.diagnosis.masking import masked, stand_in
 from armloop.laws.effects import effect
 
 
-def one(name: str, joint: int = 4) -> Any:
+def one(name: str, joint: int | None = 4) -> Any:
     return SimpleNamespace(effect=effect(name, joint))
 
 
@@ -38,3 +38,19 @@ def test_what_was_not_found_before_must_gain_beside_what_is_hidden(
     assert found is (drag if stands_in else None)
     if masking and not before:
         assert asked == [[*hidden, drag], [*hidden, spring]]
+
+
+@pytest.mark.parametrize(
+    ("clear", "shown", "hidden"),
+    [
+        (2.0, 15.0, True),
+        (2.0, 2.5, False),  # not plain in the run, either
+        (14.0, 17.0, False),  # plain whatever the model errs by, yet worth nothing: too few blocks show it
+    ],
+)
+def test_only_what_the_models_own_errors_make_unclear_is_masked_by_them(
+    clear: float, shown: float, hidden: bool
+) -> None:
+    delay, spring = one("time_delay", None), one("joint_spring")
+    fit: Any = SimpleNamespace(clear=(clear, 20.0), shown=(shown, 20.0), added=lambda: ["delay", "spring"])
+    assert masked(fit, [delay, spring], [delay.effect]) == ([(delay, "delay")] if hidden else [])

@@ -28,10 +28,14 @@ def masked(fit: Fit, found: Sequence[F], unclear: Collection[Effect]) -> list[tu
 
     Args:
         fit: all that was found.
-        unclear: effects of it that are not clear of their stated errors.
+        unclear: effects of it that are not stated: not clear of their stated errors, or worth nothing.
     """
-    every = zip(found, fit.added(), fit.shown, strict=True)
-    return [(f, added) for f, added, z in every if f.effect in unclear and z >= SIGNIFICANCE]
+    every = zip(found, fit.added(), fit.clear, fit.shown, strict=True)
+    return [
+        (f, added)
+        for f, added, clear, shown in every
+        if f.effect in unclear and clear < SIGNIFICANCE <= shown
+    ]
 
 
 def stand_in(
