@@ -16,7 +16,7 @@ from armloop.identification.reconstruction import reconstruct, torque_checks
 from armloop.identification.reconstruction.bandwidth import Table
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.robot.arm import load_arm
-from armloop.util.errors import LogError
+from armloop.util.errors import InputWarning, LogError
 
 
 def run(seed: int = 1, dry: float = 1.0, seconds: float = 40.0) -> MotionLog:
@@ -138,8 +138,9 @@ class TestWhole:
         monkeypatch.setattr(torque_checks, "Problem", Given)
         monkeypatch.setattr(torque_checks, "placed_runs", lambda logs: list(enumerate(logs)))
         monkeypatch.setattr(torque_checks, "is_time_series", lambda q, runs: q)
-        monkeypatch.setattr(torque_checks, "meant", lambda *_: ("", None))
+        monkeypatch.setattr(torque_checks, "meant", lambda *_: (asked.get("meant", ""), None))
         monkeypatch.setattr(torque_checks, "together", lambda *_: [])
+        monkeypatch.setattr(torque_checks, "times_lighter", lambda *_: asked.get("lighter", 0.0))
         return asked
 
     @staticmethod
@@ -174,6 +175,13 @@ class TestWhole:
         assert "fit one another: tau2 is about 10 times what" in self.check("a")
         asked["exchanged"] = [(0, 2)]
         assert "columns tau1 and tau3 are exchanged" in self.check("a")
+
+    def test_an_arm_that_lies_may_hang_from_drives_that_carry_it(self, asked: dict[str, Any]) -> None:
+        asked["lighter"] = 3.14
+        with pytest.warns(InputWarning, match=r"a: the torques hold no weight: .* 3\.1 times as well"):
+            assert self.check("a") == ""
+        asked["meant"] = "it lies"
+        assert self.check("a").startswith("a: it lies; or the torques hold no weight: without gravity")
 
 
 @pytest.mark.parametrize("still", ["", "they are exchanged"])

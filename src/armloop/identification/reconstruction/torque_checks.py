@@ -25,8 +25,10 @@ from armloop.identification.reconstruction.readings import meant
 from armloop.identification.reconstruction.stances import Stance, as_it_stands
 from armloop.identification.reconstruction.stances_together import together
 from armloop.identification.reconstruction.systematic_sample import placed_runs
+from armloop.identification.reconstruction.weightless import lighter, times_lighter
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
+from armloop.util.doubts import warn
 from armloop.util.errors import LogError
 
 #: Share of friction's power that must be of one sign.
@@ -79,8 +81,14 @@ def check_torques(
             "the links give that explain the other joints; check the units and drive gains of all joints"
         )
     wrong, found = _otherwise(problem, chosen, cutoff_hz, plain)
+    times = times_lighter(problem, plain)
     if wrong:
-        raise LogError(f"{names}: {wrong}")
+        raise LogError(f"{names}: {wrong}{f'; or {lighter(times)}' if times else ''}")
+    if times:
+        warn(
+            f"{names}: {lighter(times)}: energies of the library lagrangian can be of that alone, a rigid body has weight "
+            "(add tau_g(q) to tau for one)"
+        )
     return found if blind is not None else []
 
 

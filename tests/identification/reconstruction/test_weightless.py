@@ -1,0 +1,49 @@
+"""Torques of drives that compensate gravity themselves are told by what they are explained by: links without weight."""
+
+import warnings
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+
+from armloop.data.log import MotionLog
+from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.util.errors import InputWarning
+
+
+def run(seed: int, compensated: float = 0.0, balanced: bool = False) -> MotionLog:
+    """A run whose torque lacks a part of the links' weight, or whose springs carry most of it."""
+    motion, arm = fourier_motion(30.0, 100.0, seed), three_axis()
+    weight = rigid_torque(arm, motion.q, 0 * motion.v, 0 * motion.vdot)
+    tau = rigid_torque(arm, motion.q, motion.v, motion.vdot) + friction(motion.v) - compensated * weight
+    if balanced:
+        lines = [np.polyfit(q, g, 1) for q, g in zip(motion.q.T, weight.T, strict=True)]
+        tau -= np.stack([np.polyval(line, q) for line, q in zip(lines, motion.q.T, strict=True)], axis=1)
+    return measured(motion, tau, seed)
+
+
+def told(log: MotionLog) -> list[str]:
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", InputWarning)
+        check_torques([log], three_axis(), 10.0)
+    return [str(each.message) for each in said]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_torques_without_weight_are_taken_and_said_to_be(seed: int) -> None:
+    (line,) = told(run(seed, compensated=1.0))
+    assert "the torques hold no weight: without gravity all are explained" in line
+    assert "the library lagrangian" in line
+
+
+@pytest.mark.parametrize(
+    "log",
+    [
+        run(1),
+        run(1, compensated=0.5),  # half of the weight may be links of other masses
+        run(1, balanced=True),
+        run(2, balanced=True),
+    ],
+)
+def test_of_weight_that_is_there_or_that_springs_carry_nothing_is_said(log: MotionLog) -> None:
+    assert not told(log)
