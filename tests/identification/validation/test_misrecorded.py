@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rubbing_arm import model_with_baseline, run
-from synthetic import three_axis
+from synthetic import rigid_torque, three_axis
 
 from armloop.cli import main
 from armloop.data.log import MotionLog, unchecked_log, write_log
@@ -63,6 +63,10 @@ def test_units_signs_and_orders_are_told(model: ReconstructedModel, seed: int) -
     assert said(model, exchanged(log, [1, 0, 2], False)).startswith(
         "q and v are those of other joints than tau: taken as 2, 1, 3"
     )
+    still = 0.0 * log.q
+    weight = rigid_torque(model.arm, log.q, still, still)
+    assert said(model, replace(log, tau=log.tau - weight)).startswith("the torques hold no weight")
+    assert said(model, replace(log, tau=log.tau - 0.5 * weight)) == ""
     turns = exchanged(log, [0, 1, 2], True, 1 / (2 * np.pi))
     assert said(model, turns) == "angles seem to be in revolutions; give q in rad and v in rad/s"
 

@@ -1,5 +1,5 @@
 """Gross-error check of logs against a model: torques in another unit or of the other sign, joints in another order or
-counted in the other direction, angles in another unit.
+counted in the other direction, angles in another unit, torques without the links' weight.
 
 No effect on an arm multiplies all torques by one factor far from one, or makes the model right for the columns of other
 joints; a diagnosis would name whatever fits such a log least badly.
@@ -47,7 +47,8 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
     Args:
         samples: preprocessed as the model's training logs were.
     """
-    left = _relative(residual(model, samples), samples)
+    unexplained = residual(model, samples)
+    left = _relative(unexplained, samples)
     if not left.max() >= _POOR:
         return ""
     usual = _usual(model, samples)
@@ -55,6 +56,13 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
     gain = _common_gain(samples, predicted)
     if gain and _far_better(left, _relative(samples.tau - gain * predicted, samples), usual):
         return _factor(gain, "A" if model.in_amperes else "N·m (N)")
+    weight = smooth(samples, model.rigid_body(samples.motion, step=1))
+    # a joint that carries none is left as it was
+    if _far_better(left, _relative(unexplained + weight, samples), np.maximum(usual, left)):
+        return (
+            "the torques hold no weight, as where the drives compensate it themselves and report the rest: with the weight "
+            "of the links added to them the model explains the log; give the whole torque, as in the model's logs"
+        )
     for words, other in _likely(model, samples):
         if _far_better(left, _relative(residual(model, other), other), _usual(model, other)):
             return words
