@@ -70,6 +70,23 @@ def test_a_log_that_creeps_tells_no_slope() -> None:
     assert between_logs(left, np.ones_like(slow), replace(motion, v=v), blocks) == [None]
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_log_of_one_speed_tells_nothing_of_others(seed: int) -> None:
+    """A slow sweep beside exciting logs: what is wrong at its speed has a slope that nobody would see elsewhere."""
+    motion, rng = sines(4), np.random.default_rng(seed)
+    logs, blocks = log_numbers(motion), np.arange(len(motion.time)) // 50
+    sweep = (logs == 3)[:, None]
+    # a third of the fastest speed, give or take a sixth of that, as a servo keeps it
+    v = np.where(sweep, np.sign(motion.v) * (0.5 + 0.08 * rng.normal(size=motion.v.shape)), motion.v)
+    left = 0.01 * rng.normal(size=v.shape) - 0.5 * np.sign(v) * (np.abs(v) - 0.5) * sweep
+    rows = np.ones_like(sweep)
+    assert between_logs(left, rows, replace(motion, v=v), blocks) == [None]
+    # over all speeds the same line is friction that differs
+    elsewhere = left + (0.3 * np.sign(motion.v) - 0.2 * motion.v) * (logs == 1)[:, None]
+    (found,) = between_logs(elsewhere, rows, replace(motion, v=v), blocks)
+    assert found is not None and np.sqrt(found[0][0]) == pytest.approx(0.3 / np.sqrt(3), rel=0.1)
+
+
 def worn(seed: int, dry: float, seconds: float = 40.0) -> MotionLog:
     """A log in which joint 2 has so much more dry friction."""
     motion = fourier_motion(seconds, 100.0, seed)

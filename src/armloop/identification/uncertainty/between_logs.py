@@ -4,8 +4,9 @@ A drive that warms up, another load of grease: within a log nothing shows it, an
 does. Of what the model leaves, each log tells a level and a slope along its joint's direction, with the covariance of its
 own blocks; how far those lie apart beyond that is the variance between logs, by maximum likelihood (EM; Laird and Ware,
 Biometrics 38, 1982). Where logs do not differ by more than chance it is zero (the Welch-James test: covariances from few
-blocks are uncertain themselves; Johansen, Biometrika 67, 1980). A log that stays slow tells
-nothing of the slope: what a model gets wrong near standstill is no friction that differs at speed.
+blocks are uncertain themselves; Johansen, Biometrika 67, 1980). A log that keeps to
+few speeds, as slow sweeps do, has no say: what a model gets wrong within them has a slope, too, and its line would be drawn
+out to speeds at which nobody saw it.
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
 from armloop.regression.clustered import clustered_covariance
-from armloop.util.arrays import Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Where a run begins earlier than the one before it ended, or more than so many s later, another log does.
 _PAUSE = 60.0
 #: Fewest logs, and blocks with samples of a joint in each, that tell anything of the variance.
 _LOGS, _BLOCKS = 3, 8
-#: Part of the fastest log's fastest speed that a log must reach to tell a slope.
-_FAST = 0.2
+#: So many times as far off, at most, a log's line may be over the speeds of all logs as it is over its own, by the errors
+#: of a least-squares line: one determined by few speeds says nothing of others.
+_FARTHER = 3.0
 #: Probability that logs which do not differ are taken to.
 _CHANCE = 0.001
 _ITERATIONS = 200
@@ -63,8 +65,7 @@ def _variance(left: Array, v: Array, blocks: Index, logs: Index) -> list[list[fl
     for log in np.unique(logs):
         own = logs == log
         count = len(np.unique(blocks[own]))
-        fast = np.abs(v[own]).max() >= _FAST * np.abs(v).max()
-        if fast and count >= _BLOCKS:
+        if count >= _BLOCKS and _farther(v[own], v) <= _FARTHER:
             X = np.column_stack([np.sign(v[own]), v[own]])
             b = np.linalg.lstsq(X, left[own], rcond=None)[0]
             counts.append(count)
@@ -84,6 +85,16 @@ def _variance(left: Array, v: Array, blocks: Index, logs: Index) -> list[list[fl
     # the model was fitted to the logs themselves: their mean is theirs
     T = 0.5 * (T + T.T) * len(b) / (len(b) - 1)
     return [[float(x) for x in row] for row in T]
+
+
+def _farther(own: Array, v: Array) -> float:
+    """How many times as far off a line through one log's speeds (M,) is over those of all (N,), as root mean square.
+
+    By the mean variance of the line's value, 1 + (speed - mean)² / variance in units of the noise's over the samples.
+    """
+    mine, every = np.abs(own), np.abs(v)
+    spread = np.mean((every - mine.mean()) ** 2) / max(float(mine.var()), TINY)
+    return float(np.sqrt(0.5 * (1.0 + spread)))
 
 
 def _chance(d: Array, precise: Array, counts: Sequence[int]) -> float:
