@@ -132,6 +132,14 @@ def test_what_is_in_amperes_is_said_to_be(model, tmp_path):
     assert "N·m" in str(model.score(log)) and str(score).count(" A ") == 3
 
 
+def test_a_model_of_currents_says_at_once_what_it_is_no_use_for():
+    log = run(10, 4)
+    current = MotionLog(log.time, log.q, log.v, log.tau, tau_unit="A")
+    models = [al.reconstruct(each, "three_axis", library="rigid-body") for each in (log, current)]
+    said = [[note for note in each.history["notes"] if "--drive-gains" in note] for each in models]
+    assert said[0] == [] and len(said[1]) == 1 and "diagnose" in said[1][0]
+
+
 def test_a_diagnosis_has_objects_for_effects(model, found, tmp_path):
     assert found.verdict == "effects_found"
     (added,) = found.effects

@@ -146,7 +146,7 @@ class ReconstructedModel:
         if self.in_amperes:
             raise InputError(
                 f"{where} predicts motor currents (A), in which no effect and no limit has its physical size; "
-                "reconstruct it with --drive-gains K1,..,KN (N·m/A)"
+                "reconstruct it with --drive-gains K1,..,KN (N·m/A); what is found is then as exact as they are"
             )
 
     @property

@@ -56,6 +56,11 @@ _NO_USE = 0.95
 _RIPPLE = 300_000
 #: Of streamed logs, so many chunks stand for all where the torque is parted.
 _CHUNKS = 16
+#: What a reader of a model of currents else learns at the first diagnosis.
+_IN_AMPERES = (
+    "the model predicts motor currents (A), which only evaluate and export --to c can use: give --drive-gains K1,..,KN "
+    "(N·m/A) to diagnose or track with it; what is found at a joint is then as exact as its gain"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,6 +287,8 @@ def _finished(
         model = replace(model, baseline={**model.baseline, **null})
     checks = check_physics(model)
     notes += checks.faults()
+    if model.in_amperes:
+        notes.append(_IN_AMPERES)
     history = {**model.history, "physics": checks.to_dict(), "notes": notes}
     if compared:
         history["libraries"] = [one.to_dict() for one in libraries]
