@@ -89,6 +89,40 @@ def test_dry_friction_of_another_form_has_no_such_parameters(others: list[Fricti
     assert FrictionLaw(((*others, FrictionTerm("viscous", FV)),)).stribeck_parameters(0) == {}
 
 
+_LEVELS = [
+    FrictionTerm("smooth_sign", 0.5, 0.003),
+    FrictionTerm("smooth_sign", 0.2, 0.02),
+    FrictionTerm("hysteresis", 0.1, 0.01),
+]
+
+
+@pytest.mark.parametrize(
+    ("others", "static"),
+    [
+        ([], None),
+        ([FrictionTerm("stribeck_peak", 0.3, 0.1)], 1.1),
+        ([FrictionTerm("stribeck_peak", 0.3, 0.05)], None),
+        ([FrictionTerm("stribeck_peak", 0.3, 0.1), FrictionTerm("stribeck_peak", 0.2, 0.4)], None),
+        ([FrictionTerm("load_smooth_sign", 0.3, 0.003), FrictionTerm("offset", 0.4)], None),
+    ],
+    ids=["levels", "a fall", "a fall that ends while a level fades in", "two falls", "by load"],
+)
+def test_levels_add_up_once_the_joint_slides(others: list[FrictionTerm], static: float | None) -> None:
+    law = FrictionLaw(((*_LEVELS, *others, FrictionTerm("viscous", FV)),))
+    sums = {key: sum(t.coefficient for t in terms) for key, terms in law.sliding_sums(0).items()}
+    expected = {"coulomb": 0.8, "viscous": FV, **({} if static is None else {"static": static})}
+    assert sums == pytest.approx(expected)
+    # what is there fast, far from any reversal, without the load
+    unloaded = FrictionLaw((tuple(t for t in law.terms[0] if not t.by_load and t.kind != "offset"),))
+    fast = unloaded.torque(at_speeds([5.0] * 3))[-1, 0]
+    assert fast == pytest.approx(sums["coulomb"] + 5.0 * sums["viscous"], abs=1e-9)
+
+
+def test_beside_nonlinear_viscous_friction_no_level_is_stated() -> None:
+    law = FrictionLaw(((*_LEVELS, FrictionTerm("root", 0.3)), ()))
+    assert law.sliding_sums(0) == law.sliding_sums(1) == {}
+
+
 @pytest.mark.parametrize("kind", ["stribeck", "stribeck_peak", "smooth_sign"])
 def test_the_slope_by_the_parameter_is_the_derivative(kind: str) -> None:
     v = np.linspace(-1.0, 1.0, 41)

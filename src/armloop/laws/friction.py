@@ -346,6 +346,29 @@ class FrictionLaw:
         fall = stribeck_term(self.terms[joint])
         return {**values, "stribeck_velocity": fall.parameter} if values and fall else values
 
+    def sliding_sums(self, joint: int) -> dict[str, list[FrictionTerm]]:
+        """f_c, f_v, and f_s where it is determined, of a joint (0-based) whose dry friction has any number of levels.
+
+        While it slides, a direction that fades in is all there, and so is a memory: their coefficients add up to one
+        level. f_s, that level with the fall, needs one fall at most and directions that are there before it ends.
+        Empty without a level, or beside friction that is nonlinear in v, of which a level at speed is a part.
+        """
+        terms = self.terms[joint]
+        falls = [t for t in terms if t.kind in _EQUATION_34[2]]
+        levels = [t for t in terms if t.element.dry and not t.by_load and t not in falls]
+        rises = [t for t in levels if t.kind in _EQUATION_34[1]]
+        if not levels or any("nonlinear_viscous" in t.element.called for t in terms):
+            return {}
+        viscous = [t for t in terms if t.kind == "viscous"]
+        sums = {"coulomb": levels, **({"viscous": viscous} if viscous else {})}
+        fall = stribeck_term(terms)
+        if fall is None:
+            return sums
+        fading = (t.parameter for t in levels if t.element.way == "fading")
+        if all(fall.parameter > FADED * parameter for parameter in fading):
+            sums["static"] = [t for t in levels if t not in rises] + falls
+        return sums
+
     def to_dict(self) -> list[list[dict[str, Any]]]:
         """JSON-ready values, one list of terms per joint."""
         return [

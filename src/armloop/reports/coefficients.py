@@ -50,7 +50,7 @@ def coefficients_table(model: ReconstructedModel, title: str | None = "Coefficie
 
 
 def stribeck_table(model: ReconstructedModel) -> Table | None:
-    """f_s, f_c, f_v and v_s of every joint with standard errors; None where no joint has such a law."""
+    """f_s, f_c, f_v and v_s of every joint with standard errors, what its law determines of them; None without any."""
     found = model.uncertainty.get("stribeck", [])
     if not any(found):
         return None

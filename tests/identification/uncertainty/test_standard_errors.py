@@ -69,6 +69,20 @@ def test_the_coulomb_level_is_the_sum_of_two_coefficients_that_are_correlated(fi
         assert errors["stribeck"][j]["coulomb"]["std_error"] < 0.9 * np.hypot(static, excess)
 
 
+def test_the_level_that_several_elements_share_is_known_better_than_any_of_them(fit: Any) -> None:
+    """A direction written as two that fade in: neither is well determined, their sum is, and is stated."""
+    model, samples, fitted = fit
+    fall, *others = _as_fall(model.friction.terms[0])[1:]
+    level = sum(t.coefficient for t in model.friction.terms[0] if t.kind in ("sign", "stribeck"))
+    halves = [FrictionTerm("smooth_sign", level / 2, width) for width in (0.002, 0.02)]
+    law = FrictionLaw(((*halves, fall, *others), *model.friction.terms[1:]))
+    errors = standard_errors(replace(model, friction=law), samples, fitted)
+    parts = [errors["friction"][0][term.name(1)]["std_error"] for term in halves]
+    found = errors["stribeck"][0]["coulomb"]
+    assert found["value"] == pytest.approx(level)
+    assert found["std_error"] < min(parts)
+
+
 def test_the_same_law_as_a_fall_has_the_same_errors_of_its_velocity_too(fit: Any) -> None:
     """Level and rise, or level and fall onto it: f_s, f_c, f_v and v_s are the same numbers."""
     model, samples, fitted = fit

@@ -27,6 +27,7 @@ from armloop.identification.uncertainty.friction_lines import entry, friction_li
 from armloop.identification.uncertainty.propagated import leading, to_dict
 from armloop.identification.uncertainty.sandwich import Equations, gauss_newton_step
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
+from armloop.laws.friction import stribeck_term
 from armloop.model import ReconstructedModel
 from armloop.regression.determined import combination, identifiable
 from armloop.regression.moments import added
@@ -350,10 +351,15 @@ def _equations(
 
 
 def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) -> dict[str, dict[str, float]]:
-    """f_s, f_c, f_v, v_s of Eq. (34) of a joint, each a sum of friction coefficients, with standard errors."""
-    sums = model.friction.stribeck_sums(joint)
+    """f_s, f_c, f_v, v_s of a joint, of Eq. (34) or else once it slides: sums of coefficients, with standard errors."""
+    law = model.friction
+    sums = law.stribeck_sums(joint) or law.sliding_sums(joint)
+    values = {key: sum(term.coefficient for term in terms) for key, terms in sums.items()}
+    fall = stribeck_term(law.terms[joint])
+    if fall is not None and "static" in sums:
+        values["stribeck_velocity"] = fall.parameter
     found = {}
-    for key, value in model.friction.stribeck_parameters(joint).items():
+    for key, value in values.items():
         names = {term.name(joint + 1) for term in sums[key]} if key in sums else {STRIBECK_VELOCITY}
         for part in parts:
             chosen = np.array(
