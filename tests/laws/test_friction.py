@@ -118,6 +118,14 @@ def test_levels_add_up_once_the_joint_slides(others: list[FrictionTerm], static:
     assert fast == pytest.approx(sums["coulomb"] + 5.0 * sums["viscous"], abs=1e-9)
 
 
+def test_the_direction_is_there_as_soon_as_its_fastest_part() -> None:
+    sharp, memory = [FrictionTerm("sign", 0.1)], [FrictionTerm("hysteresis", 0.1, 0.01)]
+    others = [FrictionTerm("stribeck_peak", 0.3, 0.001), FrictionTerm("viscous", FV)]
+    laws = [[*_LEVELS, *others], [*_LEVELS, *sharp], memory, others]
+    law = FrictionLaw(tuple(map(tuple, laws)))
+    assert [law.fading(j) for j in range(4)] == [0.003, 0.0, 0.0, 0.0]
+
+
 def test_beside_nonlinear_viscous_friction_no_level_is_stated() -> None:
     law = FrictionLaw(((*_LEVELS, FrictionTerm("root", 0.3)), ()))
     assert law.sliding_sums(0) == law.sliding_sums(1) == {}

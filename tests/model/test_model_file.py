@@ -3,6 +3,7 @@
 import json
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +112,14 @@ def test_friction_that_feels_load_feels_a_payload_too(saved: Path) -> None:
     payload = model.effects[0].torque(model.context(motion))
     extra = model.predict(motion, sensors=False) - bare.predict(motion) - payload
     assert np.abs(extra[:, 2]).max() > 0.001 and np.abs(extra[:, :2]).max() < 1e-12
+
+
+def test_effects_are_told_how_fast_the_models_directions_fade_in(saved: Path) -> None:
+    model, motion = load_model(saved), fourier_motion(1.0, 50.0, 2)
+    first, *others = model.friction.terms
+    faded = (FrictionTerm("smooth_sign", 0.3, 0.02), FrictionTerm("smooth_sign", 0.3, 0.003))
+    other = replace(model, friction=FrictionLaw((first, faded, *others[1:])))
+    assert other.context(motion).fading[1] == other.context(motion, []).fading[1] == 0.003
 
 
 def test_a_motion_of_another_number_of_joints_is_refused(saved: Path) -> None:

@@ -320,6 +320,15 @@ class FrictionLaw:
         """Whether the friction of a joint (0-based) has memory."""
         return any(term.element.way == "memory" for term in self.terms[joint])
 
+    def fading(self, joint: int) -> float:
+        """Least speed over which a direction of the dry friction of a joint (0-based) fades in; 0 where it turns at once."""
+        dry = [
+            t for t in self.terms[joint] if t.element.dry and t.kind not in _EQUATION_34[1] + _EQUATION_34[2]
+        ]
+        if any(t.element.way == "sharp" for t in dry):
+            return 0.0
+        return min((t.parameter for t in dry if t.element.way == "fading"), default=0.0)
+
     def stribeck_sums(self, joint: int) -> dict[str, list[FrictionTerm]]:
         """f_s, f_c, f_v of Eq. (34) for a joint (0-based), each by the terms whose coefficients add up to it.
 

@@ -171,7 +171,8 @@ class ReconstructedModel:
 
     def _bare_context(self, motion: Motion, effects: Sequence[Effect]) -> Context:
         inertial = self.carried_parameters() if any(e.needs_inertial for e in effects) else None
-        return Context(self.arm, motion, inertial, motion.period)
+        fading = tuple(map(self.friction.fading, range(self.arm.n)))
+        return Context(self.arm, motion, inertial, motion.period, fading=fading)
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
         """What effects may look at; inertial parameters only where an effect needs them."""

@@ -81,6 +81,9 @@ def test_a_parameter_is_sought_where_the_run_can_show_it() -> None:
     check(grid("presliding_hysteresis", context(20.0, q=0.5)), 2e-4, 5e-2, 16)
     assert grid("presliding_hysteresis", context(20.0, q=0.0)) == []
     check(grid("stribeck_friction", context(20.0)), 0.04, 1.96, 16)
+    # where the known friction has not turned round yet, whatever turns faster would be a fall
+    check(grid("stribeck_friction", replace(context(20.0), fading=(9.0, 0.3, 9.0))), 0.3, 1.96, 16)
+    assert grid("stribeck_friction", replace(context(20.0), fading=(0.0, 3.0, 0.0))) == []
     slow = context(20.0)
     slow.motion.v[:, 1] = np.where(np.arange(2001) < 1800, 1e-6, 2.0)
     check(grid("stribeck_friction", slow), 2e-3, 2.0, 16)

@@ -112,6 +112,8 @@ class Context:
         load: (N, n) torque that passes the joints' bearings and gears, by the known model.
         predict: the known model's torque (N, n) of any motion, without sensor faults.
         predicted: (N, n) the same on this motion, with the sensor faults that come before.
+        fading: per joint the speed, rad/s (m/s), over which the direction of the known model's dry friction fades in;
+            empty or 0 where it turns at once.
     """
 
     arm: Arm
@@ -121,6 +123,7 @@ class Context:
     load: Array | None = None
     predict: Callable[[Motion], Array] | None = None
     predicted: Array | None = None
+    fading: tuple[float, ...] = ()
 
     @cached_property
     def unfaulty(self) -> Array:

@@ -24,6 +24,8 @@ class StribeckFriction(Law):
     def shapes(self, context: Context) -> Sequence[float]:
         speed = np.abs(context.motion.v[:, self.index])
         slowest, fastest = np.quantile(speed, 0.02), np.quantile(speed, 0.98)
-        # Below the slowest speeds an exponential cannot be seen, beyond the fastest it is a level with drag.
-        low, high = max(float(slowest), 1e-3 * float(fastest)), float(fastest)
+        # Below the slowest speeds an exponential cannot be seen, beyond the fastest it is a level with drag. Nor is it a
+        # fall where the known friction has not turned yet: friction that turns faster than the model says looks like one.
+        fading = context.fading[self.index] if context.fading else 0.0
+        low, high = max(float(slowest), 1e-3 * float(fastest), fading), float(fastest)
         return [] if high <= low else [float(v) for v in np.geomspace(low, high, 16)]
