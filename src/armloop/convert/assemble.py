@@ -14,6 +14,7 @@ from armloop.convert.joints import doubtful_order, match
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
 from armloop.convert.recording import Array, Recording, some
 from armloop.convert.units import CURRENTS, FACTORS, RATES, canonical, time_unit
+from armloop.convert.wraps import unwrapped
 from armloop.data.header import JOINT_COLUMN
 from armloop.data.log import FEWEST_SAMPLES, GAP_PERIODS, MotionLog, unchecked_log
 from armloop.data.plausibility import LARGEST_Q
@@ -69,6 +70,10 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     cells = {name: cells[keep] for name, cells in values.items()}
     if not np.any(cells["tau"]):
         raise LogError(f"{where}: the torques are zero throughout; this source did not record them")
+    cells["q"], wraps = unwrapped(cells["q"], np.ones(n, dtype=bool) if arm is None else arm.revolute)
+    if any(wraps):
+        which = ", ".join(f"q{j + 1} ({count} times)" for j, count in enumerate(wraps) if count)
+        notes.append(f"angles wrap after a turn: {which}; unwrapped")
     if "v" not in cells:
         cells["v"] = _differences(time, cells["q"], starts)
         notes.append("v: central differences of q, for the source has no velocities")

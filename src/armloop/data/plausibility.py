@@ -221,7 +221,7 @@ def _jumps(log: Recorded) -> Iterator[Finding]:
                     f"column q{j + 1}",
                     f"jumps by {change:.4g} from the row before"
                     + (
-                        ", as where an angle wraps; unwrap it"
+                        ", as where an angle wraps; armloop convert unwraps it"
                         if wrapped
                         else "; leave a gap in time between runs"
                     ),
