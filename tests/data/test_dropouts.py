@@ -99,6 +99,17 @@ class TestSpikes:
             # what lies beside it, at the same instant, not between it
             assert np.abs(fresh.q - log.q)[rows].max() < (1e-5 if taken is time else 1e-3)
 
+    @pytest.mark.parametrize("seed", [0, 1, 2, 3])
+    def test_rows_that_are_one_already_have_none(self, seed: int) -> None:
+        """Stamps off by up to two fifths of a period, in order: some nearly coincide, and are on a line since."""
+        rng = np.random.default_rng(seed)
+        even = np.arange(0, 20.0, 1 / RATE)
+        q = (np.sin(0.5 * even) + 1e-6 * rng.normal(size=len(even)))[:, None]
+        stamps = even + rng.uniform(-0.4, 0.4, len(even)) / RATE
+        log = MotionLog(stamps, q, 0.5 * np.cos(0.5 * even)[:, None], np.sin(3 * q), name="run")
+        (line,) = said(log)
+        assert line.startswith("column time has rows nearer to another")
+
     def test_three_samples_a_step_and_noise_are_none(self) -> None:
         log = a_log()
         for change in ("wide", "step", "many", "between runs"):

@@ -159,7 +159,8 @@ def spikes(log: Recorded) -> dict[tuple[str, int], Index]:
     is a jerk of the arm, as of brakes that fall in, and no fault; nor is what a speed does if its position moves as fast.
     """
     kinds = {"q": log.q, **({} if log.derived else {"v": log.v}), "tau": log.tau}
-    found = {(kind, j): _spikes(x[:, j], log) for kind, x in kinds.items() for j in range(x.shape[1])}
+    columns = {(kind, j): x[:, j] for kind, x in kinds.items() for j in range(x.shape[1])}
+    found = {place: _off_the_line(x, _spikes(x, log), log.time) for place, x in columns.items()}
     for j in range(0 if log.derived else log.v.shape[1]):
         rows, x = found["v", j], log.v[:, j]
         later, before = np.minimum(rows + 1, len(x) - 1), np.maximum(rows - 1, 0)
@@ -172,6 +173,12 @@ def spikes(log: Recorded) -> dict[tuple[str, int], Index]:
         count[near] += -len(found) if kind == "q" else 1
     alone = {place: rows[count[rows] < 2] for place, rows in found.items()}
     return {place: rows for place, rows in alone.items() if len(rows)}
+
+
+def _off_the_line(x: Array, rows: Index, time: Array) -> Index:
+    """Those of some rows of a column that lie off the line through what is beside them; on it, as of rows that were one
+    already, none is a spike."""
+    return rows[np.abs(x - bridged(x, rows, time))[rows] > TINY]
 
 
 def _without_spikes(log: Recorded) -> Recorded:
