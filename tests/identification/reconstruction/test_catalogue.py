@@ -233,6 +233,7 @@ class TestSearch:
             complexity=complexity,
             needs_model=False,
             periodic=False,
+            passive=False,
             shapes=lambda context: shapes,
             estimates=lambda arm, coefficients, covariance, shape: (coefficients, shape),
             plausible=lambda arm, estimates: plausible and estimates == ("of it", shapes[-1]),
@@ -410,3 +411,36 @@ class TestSearch:
         made = catalogue._smoothed(nothing, raw)
         np.testing.assert_array_equal(made, np.stack([0 * x, x + 1, -x - 1, 2 * x + 1, x + 1], axis=1))
         assert len(filtered) == 2
+
+
+def differential(motion: Motion, inertias: tuple[float, float], viscous: tuple[float, float]) -> Array:
+    """Two motors, of the sum and of the difference of v2 and v3."""
+    total = np.zeros((motion.samples, 3))
+    for ratio, inertia, damping, dry in zip((1.0, -1.0), inertias, viscous, (0.8, 0.5), strict=True):
+        w, rate = (x[:, 1] + ratio * x[:, 2] for x in (motion.v, motion.vdot))
+        total += np.outer(inertia * rate + damping * w + dry * np.sign(w), [0, 1, ratio])
+    return total
+
+
+@pytest.mark.parametrize(
+    ("inertias", "viscous"),
+    [((0.05, 0.05), (0.4, 0.4)), ((0.02, 0.1), (0.6, 0.2))],
+    ids=["alike", "unlike"],
+)
+def test_two_motors_of_a_wrist_are_found_together(
+    inertias: tuple[float, float], viscous: tuple[float, float], tmp_path: Path
+) -> None:
+    """By itself neither is: the other one's friction would be a damping below zero."""
+    found = made([partial(differential, inertias=inertias, viscous=viscous)])
+    assert named(found) == [("transmission_coupling", 2, 3)] * 2
+    motors = {added.parameters["ratio"].value: added for added in found.model.effects}
+    check(motors[1.0], {"coulomb": 0.8})
+    check(motors[-1.0], {"coulomb": 0.5})
+    # what both have in common may be each joint's own, or the rotors'
+    for name, truth in (("inertia", inertias), ("viscous", viscous)):
+        one, other = (motors[ratio].parameters[name] for ratio in (1.0, -1.0))
+        error = np.hypot(one.std_error, other.std_error)
+        assert abs(one.value - other.value - (truth[0] - truth[1])) < 4 * error + 0.02 * max(truth), name
+    assert max(found.held_out.moving["nrmse"]) < 0.05
+    found.model.save(tmp_path / "model.json")
+    assert len(load_model(tmp_path / "model.json").effects) == 2

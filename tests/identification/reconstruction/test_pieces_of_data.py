@@ -199,6 +199,21 @@ class TestCatalogue:
         law = catalogue.Law.found(effect, 0.5, columns, 0.25)
         assert (law.size, law.constant, law.gain, law.shape) == (2, (0,), 0.25, 0.5)
 
+    def test_of_a_law_that_has_some_of_its_coefficients_the_others_are_zero(self) -> None:
+        effect: Any = SimpleNamespace(
+            fixed_columns=lambda context, shape: np.tile([1.0, 2.0, shape], (5, 3, 1)),
+            estimates=lambda arm, x, covariance, shape: (x.tolist(), covariance.tolist(), shape),
+        )
+        columns = effect.fixed_columns(None, 3.0)
+        law = catalogue.Law.found(effect, 3.0, columns, 0.25, kept=np.array([True, False, True]))
+        arm: Any = None
+        assert law.size == 2 and law.columns(arm)[0, 0].tolist() == [1.0, 3.0]
+        spread = [[4.0, 0.0, 5.0], [0.0, 0.0, 0.0], [5.0, 0.0, 6.0]]
+        found = law.estimates(arm, np.array([7.0, 8.0]), np.array([[4.0, 5.0], [5.0, 6.0]]))
+        assert found == ([7.0, 0.0, 8.0], spread, 3.0)  # type: ignore[comparison-overlap]
+        whole = catalogue.Law.found(effect, 3.0, columns, 0.25, kept=np.ones(3, dtype=bool))
+        assert (whole.size, whole.kept) == (3, ())
+
     def test_columns_and_parameters_of_several_laws_stand_one_after_the_other(self) -> None:
         motion = Motion(np.arange(5.0), *np.zeros((3, 5, 3)), np.array([0]))
         laws = []

@@ -238,3 +238,16 @@ def test_what_must_be_removed_is_a_part_of_what_the_best_met_joint_leaves() -> N
     own, part = projected(X, y, rows), removed / min(squares)
     assert own.trial(columns, worth=0.999 * part) is not None
     assert own.trial(columns, worth=1.001 * part) is None
+
+
+def test_columns_that_are_sums_of_others_and_of_those_before_say_nothing() -> None:
+    X, y, columns, rows = problem(1)
+    own = projected(X, y, rows)
+    said = np.zeros((R // 2, 2))
+    said[rows.sample, rows.joint] = X[:, 2]
+    other = np.random.default_rng(7).normal(size=said.shape)
+    law = columns[:, :, 0]
+    given = np.stack([said, law, 3.0 * law - said, other, law + other, np.zeros_like(said)], axis=2)
+    assert own.fresh(given, 1e-3).tolist() == [False, True, False, True, False, False]
+    # of the law a fifth of the squares is new
+    assert own.fresh(given, 0.4)[1] and not own.fresh(given, 0.5)[1]

@@ -25,9 +25,10 @@ from scipy.stats import t as student
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
+from armloop.identification.reconstruction import differential
 from armloop.identification.reconstruction.lines import between, lines
 from armloop.identification.reconstruction.projected import CHANCE, Projected, Trial
-from armloop.laws.effects import Context, Effect, hypotheses
+from armloop.laws.effects import Context, Effect, Estimate, hypotheses
 from armloop.model import AddedEffect
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Mask
@@ -56,6 +57,7 @@ class Law:
         constant: joints (0-based) at which one of its columns is constant.
         gain: part of the squared error that it removes on left-out blocks, of the joint it shows on most.
         among: number of shapes that it could have had, where these are many.
+        kept: which of its coefficients it has, where not all of them: the others are zero.
     """
 
     effect: Effect
@@ -64,13 +66,33 @@ class Law:
     constant: tuple[int, ...] = ()
     gain: float = 0.0
     among: int = 1
+    kept: tuple[bool, ...] = ()
 
     @staticmethod
-    def found(effect: Effect, shape: float, columns: Array, gain: float, among: int = 1) -> Law:
+    def found(
+        effect: Effect, shape: float, columns: Array, gain: float, among: int = 1, kept: Mask | None = None
+    ) -> Law:
         """A law whose unfiltered columns on some motion are (N, n, p)."""
+        if kept is not None and not kept.all():
+            law = Law.found(effect, shape, columns[:, :, kept], gain, among)
+            return replace(law, kept=tuple(kept.tolist()))
         flat = (np.ptp(columns, axis=0) == 0) & columns.any(axis=0)
         constant = tuple(np.flatnonzero(flat.any(axis=1)).tolist())
         return Law(effect, shape, columns.shape[2], constant, gain, among)
+
+    def columns(self, context: Context) -> Array:
+        """(N, n, size) torque per unit of each coefficient, unfiltered."""
+        columns = self.effect.fixed_columns(context, self.shape)
+        return columns[:, :, list(self.kept)] if self.kept else columns
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array) -> dict[str, Estimate]:
+        """Named parameters from its coefficients (size,) and their covariance."""
+        if self.kept:
+            kept = np.array(self.kept)
+            every, among = np.zeros(len(kept)), np.zeros((len(kept),) * 2)
+            every[kept], among[np.ix_(kept, kept)] = x, covariance
+            x, covariance = every, among
+        return self.effect.estimates(arm, x, covariance, self.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +126,7 @@ class Laws:
     def raw(self, arm: Arm, motion: Motion, period: float) -> Array:
         """(N, n, p) torque per unit of each coefficient, unfiltered."""
         context = Context(arm, motion, period=period)
-        parts = [law.effect.fixed_columns(context, law.shape) for law in self.chosen]
+        parts = [law.columns(context) for law in self.chosen]
         return np.concatenate([np.zeros((motion.samples, arm.n, 0)), *parts], axis=2)
 
     def columns(self, arm: Arm, samples: Samples) -> Array:
@@ -123,10 +145,7 @@ class Laws:
             if law.effect.needs_model or law.effect.memory:
                 parts.append(np.zeros((len(q), n, n, law.size)))
                 continue
-            both = [
-                law.effect.fixed_columns(Context(arm, motion), law.shape)
-                for motion in (pushed, replace(pushed, vdot=pushed.v))
-            ]
+            both = [law.columns(Context(arm, motion)) for motion in (pushed, replace(pushed, vdot=pushed.v))]
             added = (both[0] - both[1]).reshape(len(q), n, n, law.size)
             parts.append(added.transpose(0, 2, 1, 3))
         return np.concatenate(parts, axis=3)
@@ -145,7 +164,7 @@ class Laws:
         for law, x in zip(self.chosen, self.split(theta), strict=True):
             own = slice(start, start + law.size)
             start += law.size
-            parameters = law.effect.estimates(arm, x, covariance[own, own], law.shape)
+            parameters = law.estimates(arm, x, covariance[own, own])
             found.append(AddedEffect(law.effect, parameters, "always"))
         return found
 
@@ -190,7 +209,7 @@ def search(
     while len(chosen) < _MOST:
         own = bench(chosen)
         taken = {law.effect.place for law in chosen}
-        trials = []
+        trials: list[tuple[Effect, dict[float, Mask | None], Trial, int]] = []
         for effect, all_of in zip(listed, shapes, strict=True):
             if effect.place in taken and not effect.periodic:
                 continue
@@ -198,16 +217,24 @@ def search(
             few = _peaks(own, effect, all_of, context) if effect.periodic else all_of
             found = _best_shape(own, effect, few, context, samples)
             if found is not None and is_worth(found[1], tried * among) and _plausible(arm, effect, *found):
-                trials.append((effect, *found, among))
+                trials.append((effect, {found[0]: None}, found[1], among))
+            two = _two_motors(own, effect, all_of, context, samples)
+            if two is not None and is_worth(two[1], tried):
+                trials.append((effect, *two, among))
         if not trials:
             break
         most = max(trial.removed for _, _, trial, _ in trials)
         as_good = [one for one in trials if one[2].removed >= _AS_GOOD * most]
-        effect, shape, trial, among = min(as_good, key=lambda one: (one[0].complexity, -one[2].removed))
+        effect, parts, trial, among = min(
+            as_good, key=lambda one: (one[0].complexity * len(one[1]), -one[2].removed)
+        )
         progress(
             f"{effect.label()}: fitted together with the rest it removes {trial.share:.0%} on left-out blocks"
         )
-        chosen.append(Law.found(effect, shape, effect.fixed_columns(context, shape), trial.share, among))
+        chosen += [
+            Law.found(effect, shape, effect.fixed_columns(context, shape), trial.share, among, kept)
+            for shape, kept in parts.items()
+        ]
     return Laws(chosen, tried)
 
 
@@ -254,6 +281,17 @@ def _best_shape(
         if trial is not None and (best is None or trial.removed > best[1].removed):
             best = shape, trial
     return best
+
+
+def _two_motors(
+    own: Projected, effect: Effect, shapes: Sequence[float], context: Context, samples: Samples
+) -> tuple[dict[float, Mask | None], Trial] | None:
+    """A passive law of two shapes that is there with both: the coefficients of either that are needed; None elsewhere."""
+    if not effect.passive or len(shapes) != 2:
+        return None
+    columns = [_smoothed(samples, effect.fixed_columns(context, shape)) for shape in shapes]
+    found = differential.both(own, columns, _NEW, WORTH)
+    return None if found is None else (dict(zip(shapes, found[0], strict=True)), found[1])
 
 
 def _smoothed(samples: Samples, columns: Array) -> Array:

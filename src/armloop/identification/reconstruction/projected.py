@@ -127,20 +127,12 @@ class Projected:
             new: part of one of them at least that must be new to the model.
             worth: part of some joint's squared error that they must remove where they are fitted.
         """
-        rows, k = self._rows, columns.shape[2]
+        k = columns.shape[2]
+        pieces, Z, own, toward, cross = self._products(columns)
         joints = [j for j in range(columns.shape[1]) if columns[:, j].any()]
-        pieces = [(fold, piece) for joint, fold, piece in self._pieces if joint in joints]
-        if not pieces:
-            return None
-        Z = [columns[rows.sample[p], rows.joint[p]] * rows.weight[p, None] for _, p in pieces]
-        own, toward = np.zeros((len(self._folds), k, k)), np.zeros((len(self._folds), k))
-        cross = np.zeros((len(self._folds), self._X.shape[1], k))
-        for (fold, piece), z in zip(pieces, Z, strict=True):
-            own[fold] += z.T @ z
-            toward[fold] += z.T @ self._y[piece]
-            cross[fold] += self._X[piece].T @ z
+        rows = self._rows
         owns, towards, crosses = own.sum(axis=0), toward.sum(axis=0), cross.sum(axis=0)
-        if not (np.diag(owns) > 1e-18).all():
+        if not pieces or not (np.diag(owns) > 1e-18).all():
             return None
         if new > 0:
             said = self._span.T @ sum(
@@ -177,6 +169,38 @@ class Projected:
         blocks = np.concatenate([rows.block[p] for _, p in pieces])
         covariance = block_covariance(np.linalg.inv(S), np.concatenate(scores), blocks)
         return self._judged(left, beta, covariance)
+
+    def fresh(self, columns: Array, new: float) -> Mask:
+        """(k,) which of further columns (N, n, k) say something beside those of the regression and those before them.
+
+        Args:
+            new: part of a column at least that is new (pivots of Cholesky's factorisation, unpermuted).
+        """
+        _, _, own, _, cross = self._products(columns)
+        owns, crosses = own.sum(axis=0), cross.sum(axis=0)
+        S = owns - crosses.T @ self._solve(self._factor_all, crosses)
+        kept = np.zeros(len(S), dtype=bool)
+        for k in range(len(S)):
+            before = np.flatnonzero(kept)
+            pivot = S[k, k] - S[k, before] @ np.linalg.solve(S[np.ix_(before, before)], S[before, k])
+            kept[k] = pivot > new**2 * owns[k, k] > 0
+        return kept
+
+    def _products(self, columns: Array) -> tuple[list[tuple[int, slice]], list[Array], Array, Array, Array]:
+        """Folds and rows of the joints that columns (N, n, k) act on, the columns there, weighted, and by fold their
+        products with one another (K, k, k), with the torque (K, k) and with the regression's (K, p, k).
+        """
+        rows, k = self._rows, columns.shape[2]
+        acts = [j for j in range(columns.shape[1]) if columns[:, j].any()]
+        pieces = [(fold, piece) for joint, fold, piece in self._pieces if joint in acts]
+        Z = [columns[rows.sample[p], rows.joint[p]] * rows.weight[p, None] for _, p in pieces]
+        own, toward = np.zeros((len(self._folds), k, k)), np.zeros((len(self._folds), k))
+        cross = np.zeros((len(self._folds), self._X.shape[1], k))
+        for (fold, piece), z in zip(pieces, Z, strict=True):
+            own[fold] += z.T @ z
+            toward[fold] += z.T @ self._y[piece]
+            cross[fold] += self._X[piece].T @ z
+        return pieces, Z, own, toward, cross
 
     def _judged(self, after: Array, beta: Array, covariance: Array) -> Trial | None:
         """None where no row that was left out tells of the columns."""

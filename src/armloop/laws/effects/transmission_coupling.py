@@ -41,7 +41,7 @@ class TransmissionCoupling(Law):
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         # Each of the three may be absent, none may be clearly negative.
         return all(
-            number(parameters[p.name].value) > -3 * number(parameters[p.name].std_error)
+            number(parameters[p.name].value) >= -3 * number(parameters[p.name].std_error)
             for p in self.parameters[:3]
         )
 
