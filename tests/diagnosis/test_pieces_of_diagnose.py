@@ -97,6 +97,9 @@ class Answers:
             "without_law": lambda evidence, law: evidence,
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
+        parts["suspected"] = lambda evidence, found, left: self.note(
+            "suspected", (evidence.name, found, left), []
+        )
         for name, part in parts.items():
             monkeypatch.setattr(module, name, part)
 
@@ -240,6 +243,9 @@ def test_a_run_that_moves_is_searched(
         ("errors", True),
         [] if unlisted is None else [unlisted],
     )
+    # what is too small to be stated is asked of what nothing accounts for, beside no law that is not listed
+    small = None if turned or law else ("account", found, [1])
+    assert answers.asked.get("suspected") == small
     part = [] if law is None else ["drag is a part"]
     assert made.reasons == [*part, "stands", "zeros of ['run']"] and made.zeros.tolist() == [[0.1] * 3]
 

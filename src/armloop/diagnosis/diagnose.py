@@ -39,10 +39,12 @@ from armloop.diagnosis.reasons import (
     in_doubt,
     masked,
     standing,
+    too_small,
     too_still,
 )
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.score import mean_by_joint, ratio
+from armloop.diagnosis.suspected import suspected
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted, without_law
 from armloop.diagnosis.whereabouts import whereabouts
@@ -388,5 +390,10 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
         doubted += [event_in_doubt(each.added) for each in drowning]
         contacts = [each for each in contacts if each not in drowning]
     doubted += [masked(each) for each in outcome.masked if _is_left(each.effect, outcome, stand.left)]
+    if unlisted is None and turned is None:
+        unsaid = sorted(set(stand.left) - {j for each in outcome.masked for j in each.effect.indices})
+        doubted += [
+            too_small(e.label(), of, part) for e, of, part in suspected(evidence, outcome.found, unsaid)
+        ]
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))

@@ -136,7 +136,17 @@ def masked(added: AddedEffect) -> str:
     """A sentence on an effect that is plain in the run, but no larger than what the model itself may err by."""
     return (
         f"{added.effect.label()} would explain some of what is left there, but is no larger than what the model's own "
-        "coefficients may be wrong by, friction that differs from log to log among them: it is not stated"
+        "coefficients may be wrong by, friction that differs from log to log among them, or than what it leaves at its "
+        "worst on its own training logs: it is not stated"
+    )
+
+
+def too_small(label: str, joints: Sequence[int], share: float) -> str:
+    """A sentence on a law that is no chance in the run at joints (0-based), but no larger than the model's own errors."""
+    where = f"joint{'s' * (len(joints) > 1)} {', '.join(str(j + 1) for j in joints)}"
+    return (
+        f"{where}: {label} would explain {share:.0%} of what is left beyond the baseline, which is no chance, but no "
+        "more than the model leaves at its worst on its own training logs: it is not stated"
     )
 
 

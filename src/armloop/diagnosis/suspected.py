@@ -1,0 +1,66 @@
+"""Bonferroni screening of what is left unnamed: which law would explain it, where that is too little to be stated.
+
+A law is stated if it removes more than the model leaves on the worst tenth of its own training data. Where that is much, and
+nothing but noise, smaller changes are plain beside it: over the blocks of the run no chance, though as many laws were asked.
+What a model gets wrong of a motion that it does not know well looks the same, so it is said, and no verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.judgement import MOST, SIGNIFICANCE, gain, lead
+from armloop.diagnosis.outcomes import Found
+from armloop.diagnosis.search import log_posterior
+from armloop.diagnosis.trials import Known
+from armloop.laws.effects import Effect, hypotheses
+from armloop.util.arrays import TINY
+
+
+def suspected(
+    evidence: Evidence, found: Sequence[Found], joints: Sequence[int]
+) -> list[tuple[Effect, tuple[int, ...], float]]:
+    """Laws that are the likeliest of joints (0-based) that nothing is named at, these joints, and which part of what is left
+    there beyond the baseline each explains; none where that is not most of it, or may be chance.
+
+    Of several joints a law of all of them is asked, too, and goes first if it is the likeliest: a delay is none of a joint.
+
+    Args:
+        found: effects that are stated.
+        joints: those of which more is left than the baseline, and predictable.
+    """
+    there = [f.effect for f in found]
+    bare = [j for j in joints if not any(e.joint is not None and j in e.indices for e in there)]
+    places = {effect.place for effect in there}
+    alone = [e for e in hypotheses(evidence.model.arm) if e.indices in {(j,) for j in bare}]
+    tied = [e for e in hypotheses(evidence.model.arm) if e.joint is None and e.place not in places]
+    asked = alone + (tied if len(bare) > 1 else [])
+    if not asked:
+        return []
+    known = Known.of(evidence, there, [f.shape for f in found])
+    current, n = known.fit.score, len(evidence.scale)
+    trials = [(effect, trial.score) for effect in asked if (trial := known.trial(effect)) is not None]
+    blocks = len(np.unique(evidence.blocks))
+    surely = float(student.isf(norm.sf(SIGNIFICANCE) / len(asked), max(blocks - 1, 1)))
+    said: list[tuple[Effect, tuple[int, ...], float]] = []
+    while bare:
+        # a law of the whole arm lists no joints
+        mine = [(e, score) for e, score in trials if e.joint is None or set(e.indices) & set(bare)]
+        if not mine:
+            break
+        effect, score = max(mine, key=lambda each: log_posterior(evidence, each[1], [each[0]]))
+        of = tuple(j for j in bare if effect.joint is None or j in effect.indices)
+        some = np.isin(np.arange(n), of)
+        before, after = current.of_joints(some), score.of_joints(some)
+        part = gain(before, after) / max(float(np.maximum(before.excess, 0.0).sum()), TINY)
+        if part >= MOST and lead(before, after) > surely:
+            said.append((effect, of, min(part, 1.0)))
+            bare = [j for j in bare if j not in of]
+        else:
+            trials = [each for each in trials if each[0] is not effect]
+    return said
