@@ -136,8 +136,7 @@ def masked(added: AddedEffect) -> str:
     """A sentence on an effect that is plain in the run, but no larger than what the model itself may err by."""
     return (
         f"{added.effect.label()} would explain some of what is left there, but is no larger than what the model's own "
-        "coefficients may be wrong by, friction that differs from log to log among them, or than what it leaves at its "
-        "worst on its own training logs: it is not stated"
+        "coefficients may be wrong by, friction that differs from log to log among them: it is not stated"
     )
 
 
