@@ -24,7 +24,8 @@ def model() -> ReconstructedModel:
     """Its residual is noise, and the worst tenth of it was twice as much."""
     own = model_with_baseline()
     rmse = np.array(own.baseline["rmse"])
-    return replace(own, baseline={**own.baseline, "worst": (2.0 * rmse).tolist()})
+    noise = [{"joint": j + 1, "predictable_left": 0.0, "std_error": 1e-6, "noise": 1e-4} for j in range(3)]
+    return replace(own, baseline={**own.baseline, "worst": (2.0 * rmse).tolist(), "joints": noise})
 
 
 def evidence_of(model: ReconstructedModel, log: MotionLog) -> Evidence:
@@ -44,6 +45,20 @@ def test_a_small_law_is_said_and_not_stated(model: ReconstructedModel, seed: int
     assert verdict == "no_effect"
     # the same of one that the search had named, and took back
     assert "coulomb_friction at joint 2 would explain " in said and "at its worst" in said
+
+
+@pytest.mark.parametrize("known", [{"predictable_left": 1e-4, "std_error": 1e-6, "noise": 1e-4}, {}])
+def test_what_the_model_itself_gets_wrong_may_look_like_it(
+    model: ReconstructedModel, known: dict[str, float]
+) -> None:
+    """Half of what it leaves can be predicted, twice as much of it on the worst tenth; or nobody asked."""
+    joints = [{"joint": j + 1, **known} for j in range(3)]
+    poor = replace(model, baseline={**model.baseline, "joints": joints})
+    log = run(1, 60.0, float(model.baseline["rmse"][1]))
+    assert [e.label() for e, _, _ in suspected(evidence_of(model, log), [], [1])] == [
+        "coulomb_friction at joint 2"
+    ]
+    assert suspected(evidence_of(poor, log), [], [1]) == []
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

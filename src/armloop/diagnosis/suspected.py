@@ -1,8 +1,9 @@
 """Bonferroni screening of what is left unnamed: which law would explain it, where that is too little to be stated.
 
 A law is stated if it removes more than the model leaves on the worst tenth of its own training data. Where that is much, and
-nothing but noise, smaller changes are plain beside it: over the blocks of the run no chance, though as many laws were asked.
-What a model gets wrong of a motion that it does not know well looks the same, so it is said, and no verdict.
+mostly noise, smaller changes are plain beside it: over the blocks of the run no chance, though as many laws were asked, and
+more than what a regression could predict of what the model leaves there. What a model gets wrong of a motion that it does
+not know well may look the same, so it is said, and no verdict.
 """
 
 from __future__ import annotations
@@ -19,7 +20,18 @@ from armloop.diagnosis.outcomes import Found
 from armloop.diagnosis.search import log_posterior
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
-from armloop.util.arrays import TINY
+from armloop.util.arrays import TINY, Array
+
+
+def _shortcomings(evidence: Evidence) -> Array:
+    """(n,) squared error, weighted, a row, of each joint that could be predicted of what the model leaves on the worst tenth
+    of its training data; all of it where that was not asked."""
+    parts = np.ones(len(evidence.scale))
+    for j, joint in enumerate(evidence.model.baseline.get("joints") or []):
+        left, error, noise = (joint.get(key) for key in ("predictable_left", "std_error", "noise"))
+        if None not in (left, error, noise):
+            parts[j] = min((left + SIGNIFICANCE * error) / max(left + noise, TINY), 1.0)
+    return np.asarray(parts * evidence.variation)
 
 
 def suspected(
@@ -47,6 +59,7 @@ def suspected(
     trials = [(effect, trial.score) for effect in asked if (trial := known.trial(effect)) is not None]
     blocks = len(np.unique(evidence.blocks))
     surely = float(student.isf(norm.sf(SIGNIFICANCE) / len(asked), max(blocks - 1, 1)))
+    least = _shortcomings(evidence)
     said: list[tuple[Effect, tuple[int, ...], float]] = []
     while bare:
         # a law of the whole arm lists no joints
@@ -57,8 +70,9 @@ def suspected(
         of = tuple(j for j in bare if effect.joint is None or j in effect.indices)
         some = np.isin(np.arange(n), of)
         before, after = current.of_joints(some), score.of_joints(some)
+        more = gain(before, after) > float((least * current.rows)[some].sum())
         part = gain(before, after) / max(float(np.maximum(before.excess, 0.0).sum()), TINY)
-        if part >= MOST and lead(before, after) > surely:
+        if more and part >= MOST and lead(before, after) > surely:
             said.append((effect, of, min(part, 1.0)))
             bare = [j for j in bare if j not in of]
         else:
