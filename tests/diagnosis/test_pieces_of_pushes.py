@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import three_axis
+from exact_parts import six_joints
+from synthetic import fourier_motion, three_axis
 
 from armloop.data.motion import Motion
 from armloop.diagnosis import pushes
 from armloop.laws.effects import Estimate, effect
 from armloop.model import AddedEffect
+from armloop.robot.kinematics import tool_jacobian
 
 
 def motion(lengths: tuple[int, ...], joints: int = 1) -> Motion:
@@ -66,6 +69,37 @@ class TestWhereAForceActs:
     def test_no_more_is_known_of_a_link_than_its_points_are_apart(self) -> None:
         found = pushes._somewhere(self.at(4.0, 3.0), []).added.parameters
         np.testing.assert_allclose(found["link"].std_error, 0.5 / np.sqrt(12))
+
+    @pytest.mark.parametrize(("beyond", "error"), [(1.0, np.sqrt(4.0 + 0.09)), (3.1, np.sqrt(0.5 + 0.09))])
+    def test_it_may_be_as_far_off_as_a_point_beyond_them_says(self, beyond: float, error: float) -> None:
+        points = [self.at(4.5, 2.0), self.at(3.5, 4.0), self.at(4.0, 3.0)]
+        found = pushes._somewhere(self.at(0.0, 3.0), points, self.at(0.0, beyond)).added.parameters
+        assert found["force"].value == [3.0, 0.0, 0.0]
+        np.testing.assert_allclose(found["force"].std_error, [error, 0.0, 0.0])
+
+    @pytest.mark.parametrize("tool", [False, True])
+    @pytest.mark.parametrize("seed", [1, 2, 3])
+    def test_a_force_beyond_the_last_link_lies_within_its_error(self, seed: int, tool: bool) -> None:
+        """Of a gripper that the URDF does not have, or whose fingers are longer than it says."""
+        rng = np.random.default_rng(seed)
+        arm, away, held = six_joints(), np.eye(4), np.eye(4)
+        away[:3, 3], held[0, 3] = rng.uniform(-0.25, 0.25, 3), 0.08 * tool
+        given = fourier_motion(6.0, 100.0, seed, arm)
+        force = rng.normal(size=3) * 10.0
+        rows = slice(250, 350)
+        residual = 0.02 * rng.normal(size=(600, 6))
+        residual[rows] -= force @ tool_jacobian(replace(arm, X_tool=away), given.q[rows])
+        evidence: Any = SimpleNamespace(
+            samples=SimpleNamespace(motion=given, period=0.01, reach=0.02),
+            scale=np.full(6, 0.02),
+            variation=np.ones(6),
+            model=SimpleNamespace(arm=replace(arm, X_tool=held)),
+        )
+        found = pushes.push(evidence, residual, rows, np.ones((600, 6), dtype=bool), list(range(6)))
+        assert found is not None and found.added.effect.name == "external_contact"
+        stated = found.added.parameters["force"]
+        off = np.abs(np.asarray(stated.value) - force)
+        assert (off < 3 * np.asarray(stated.std_error)).all() and (off > 0.5).any()
 
     def test_a_force_on_the_tool_has_no_link(self) -> None:
         found = pushes._somewhere(self.at(0.0, 3.0), [self.at(4.5, 3.0)]).added.parameters

@@ -12,6 +12,7 @@ from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import REFINEMENTS
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, NOTICEABLE, enough, leaves_more
+from armloop.diagnosis.line_of_action import point_of_action
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.base import number
@@ -59,15 +60,24 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class _Kind:
-    """A force on a link's far end (0: on the tool; 2.5: on the middle of link 3) or a torque on a joint."""
+    """A force on a link's far end (0: on the tool; 2.5: on the middle of link 3) or a torque on a joint.
+
+    Attributes:
+        point: (3,) of the last link's frame, m, on which the force acts in the tool's place.
+    """
 
     effect: Effect
     link: float = 0
+    point: Array | None = None
 
     def columns(self, evidence: Evidence, part: Motion) -> Array:
         """(N, n, p) torque per unit."""
-        context = Context(evidence.model.arm, part)
-        return self.effect.on_all_joints(self.effect.columns(context, self.link), part.joints)
+        arm = evidence.model.arm
+        if self.point is not None:
+            X_tool = np.eye(4)
+            X_tool[:3, 3] = self.point
+            arm = replace(arm, X_tool=X_tool)
+        return self.effect.on_all_joints(self.effect.columns(Context(arm, part), self.link), part.joints)
 
 
 def around(motion: Motion, burst: slice) -> Mask:
@@ -130,7 +140,11 @@ def push(
         return best
     along = (_Kind(chosen.effect, link) for link in np.arange(_STEP, n + _STEP, _STEP).tolist())
     points = [_trial(evidence, residual, weight, burst, kind, shown) for kind in along]
-    return _somewhere(best, [p for p in points if p and p.share >= most - FREEDOM and not p.contradicted])
+    anywhere = [p for p in points if p and p.share >= most - FREEDOM and not p.contradicted]
+    beyond = _off_the_links(evidence, residual, weight, burst, shown) if forceful else None
+    if beyond is not None and chosen.link not in (0, n) and beyond.share <= most + FREEDOM:
+        beyond = None  # the joints beyond its link feel nothing of it
+    return _somewhere(best, anywhere, beyond)
 
 
 def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, joint: int) -> Contact | None:
@@ -143,11 +157,32 @@ def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, 
     return trial if trial is not None and trial.own >= MOSTLY else None
 
 
-def _somewhere(found: Contact, points: list[Contact]) -> Contact:
-    """A force on one of these points, nobody knows on which: its error, and its link's, by the law of total variance."""
-    forces = [point.added.parameters["force"] for point in (found, *points)]
+def _off_the_links(
+    evidence: Evidence, residual: Array, weight: Array, burst: slice, shown: list[int]
+) -> Contact | None:
+    """The same force on the point of the last link, or of what that holds, on which it explains most."""
+    kind = _Kind(effect("external_contact", None), 0, np.zeros(3))
+    still, *ends = (
+        _burst(evidence, residual, weight, burst, replace(kind, point=point))[1]
+        for point in (np.zeros(3), *np.eye(3))
+    )
+    y = residual[burst] * weight[burst]
+    point = point_of_action(still, [end - still for end in ends], y)
+    return _trial(evidence, residual, weight, burst, replace(kind, point=point), shown)
+
+
+def _somewhere(found: Contact, points: list[Contact], beyond: Contact | None = None) -> Contact:
+    """A force on one of these points, nobody knows on which: its error, and its link's, by the law of total variance.
+
+    Args:
+        beyond: the same force where on the last link, or on what that holds, it explains most; it may be as far off.
+    """
+    everywhere = (found, *points, *((beyond,) if beyond else ()))
+    forces = [point.added.parameters["force"] for point in everywhere]
     values, errors = (np.array([getattr(f, of) for f in forces]) for of in ("value", "std_error"))
-    error = np.sqrt(np.mean((values - values[0]) ** 2 + errors**2, axis=0))
+    squares = (values - values[0]) ** 2 + errors**2
+    variance = squares[: len(points) + 1].mean(axis=0)
+    error = np.sqrt(np.maximum(variance, squares[-1]) if beyond else variance)
     parameters = {**found.added.parameters, "force": replace(forces[0], std_error=error.tolist())}
     if "link" in parameters:
         own = number(parameters["link"].value)

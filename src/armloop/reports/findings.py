@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armloop.diagnosis.pushes import FEW
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.laws.effects.time_delay import TimeDelay
 from armloop.reports.prose import Prose
@@ -38,6 +39,7 @@ def findings(diagnosis: Diagnosis) -> list[str]:
         "contacts": diagnosis.contacts,
         "events": _events(diagnosis),
         "toolless": _toolless(diagnosis),
+        "few_joints": diagnosis.model.arm.n <= FEW,
         "judged": diagnosis.judged,
         "unlisted": unlisted,
         "adopted": diagnosis.adopted,
