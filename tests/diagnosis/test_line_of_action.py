@@ -7,7 +7,7 @@ import pytest
 from exact_parts import six_joints
 from synthetic import fourier_motion
 
-from armloop.diagnosis.line_of_action import point_of_action
+from armloop.diagnosis.line_of_action import force_and_point
 from armloop.robot.kinematics import tool_jacobian
 
 
@@ -23,14 +23,16 @@ def test_force_and_line_are_those_of_exact_torques(seed: int) -> None:
     rng = np.random.default_rng(seed)
     q = fourier_motion(2.0, 100.0, seed, six_joints()).q
     point, force = rng.uniform(-0.3, 0.3, 3), rng.normal(size=3)
-    still = columns(q, np.zeros(3))
-    found = point_of_action(
-        still, [columns(q, axis) - still for axis in np.eye(3)], columns(q, point) @ force
-    )
-    X = columns(q, found).reshape(-1, 3)
-    again = np.linalg.lstsq(X, (columns(q, point) @ force).ravel(), rcond=None)[0]
-    assert np.linalg.norm(again - force) < 1e-3 * np.linalg.norm(force)
-    left = (columns(q, point) @ force).ravel() - X @ again
-    before = (columns(q, point) @ force).ravel()
-    alone = before - still.reshape(-1, 3) @ np.linalg.lstsq(still.reshape(-1, 3), before, rcond=None)[0]
-    assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(alone)
+    still, torques = columns(q, np.zeros(3)), columns(q, point) @ force
+    levers = [columns(q, axis) - still for axis in np.eye(3)]
+    found, at, share = force_and_point(still, levers, torques, 0.5, 1e-3, 10**9)
+    assert np.linalg.norm(found - force) < 1e-3 * np.linalg.norm(force) and share > 1 - 1e-6
+    np.testing.assert_allclose(columns(q, at) @ found, torques, atol=1e-3 * np.abs(torques).max())
+    # nearer by what is usual, where little tells of it
+    _, near, less = force_and_point(still, levers, torques, 0.01, 1e-3, 5)
+    assert np.linalg.norm(near) < np.linalg.norm(at) and less < share
+    # in no direction that the known point does not feel
+    sizes, directions = np.linalg.svd(still.reshape(-1, 3), full_matrices=False)[1:]
+    one = (sizes[1] / sizes[0] + 1) / 2
+    found, _, _ = force_and_point(still, levers, torques, 0.5, one, 100)
+    np.testing.assert_allclose(directions[1:] @ found, 0.0, atol=1e-12)

@@ -73,7 +73,8 @@ class TestWhereAForceActs:
     @pytest.mark.parametrize(("beyond", "error"), [(1.0, np.sqrt(4.0 + 0.09)), (3.1, np.sqrt(0.5 + 0.09))])
     def test_it_may_be_as_far_off_as_a_point_beyond_them_says(self, beyond: float, error: float) -> None:
         points = [self.at(4.5, 2.0), self.at(3.5, 4.0), self.at(4.0, 3.0)]
-        found = pushes._somewhere(self.at(0.0, 3.0), points, self.at(0.0, beyond)).added.parameters
+        force = np.array([beyond, 0.0, 0.0])
+        found = pushes._somewhere(self.at(0.0, 3.0), points, force).added.parameters
         assert found["force"].value == [3.0, 0.0, 0.0]
         np.testing.assert_allclose(found["force"].std_error, [error, 0.0, 0.0])
 

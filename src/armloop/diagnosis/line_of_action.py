@@ -11,11 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 
-def point_of_action(still: Array, levers: Sequence[Array], y: Array) -> Array:
-    """(3,) point in the last link's frame, m, at which one force explains most; the nearest of the force's line.
+def force_and_point(
+    still: Array, levers: Sequence[Array], y: Array, away: float, felt: float, count: int
+) -> tuple[Array, Array, float]:
+    """Force (3,) and point (3,) in the last link's frame, m, with which it explains most; and which part of the squares.
 
     Torques are linear in the force at a point and in the point under a force: for every point the force is the one that
     explains most (variable projection; Golub and Pereyra, SIAM J. Numerical Analysis 10, 1973).
@@ -24,21 +26,34 @@ def point_of_action(still: Array, levers: Sequence[Array], y: Array) -> Array:
         still: (N, n, 3) torques, weighted, per unit of a force on the frame's origin.
         levers: of each axis of the frame, what a metre along it adds to them.
         y: (N, n) torques, weighted.
+        away: how far along each axis the point usually is, m: the standard deviation of its normal prior.
+        felt: directions that the origin feels less than this part of the one it feels most are none of the force's.
+        count: number of independent torques among them, of which what a force on the origin leaves is the noise.
     """
     torques, flat = y.ravel(), [x.reshape(-1, 3) for x in (still, *levers)]
+    _, sizes, directions = np.linalg.svd(flat[0], full_matrices=False)
+    V = directions[sizes > felt * sizes[0]].T
 
     def force_at(point: Array) -> tuple[Array, Array]:
-        columns = flat[0] + sum(x * lever for x, lever in zip(point, flat[1:], strict=True))
+        columns = (flat[0] + sum(x * lever for x, lever in zip(point, flat[1:], strict=True))) @ V
         return columns, np.linalg.lstsq(columns, torques, rcond=None)[0]
 
     def left(point: Array) -> Array:
-        columns, force = force_at(point)
-        return np.asarray(torques - columns @ force)
+        columns, size = force_at(point)
+        return np.asarray(torques - columns @ size)
+
+    prior = float(np.linalg.norm(left(np.zeros(3)))) / (np.sqrt(count) * away)
 
     def slopes(point: Array) -> Array:
         """As Kaufman (BIT 15, 1975): of what a lever adds, the part that no force on the point explains."""
-        columns, force = force_at(point)
-        moved = np.stack([lever @ force for lever in flat[1:]], axis=1)
+        columns, size = force_at(point)
+        moved = np.stack([lever @ V @ size for lever in flat[1:]], axis=1)
         return np.asarray(columns @ np.linalg.lstsq(columns, moved, rcond=None)[0] - moved)
 
-    return np.asarray(least_squares(left, np.zeros(3), slopes).x)
+    at = least_squares(
+        lambda point: np.concatenate([left(point), prior * point]),
+        np.zeros(3),
+        lambda point: np.concatenate([slopes(point), prior * np.eye(3)]),
+    ).x
+    share = 1 - float(np.sum(left(at) ** 2)) / max(float(torques @ torques), TINY)
+    return V @ force_at(at)[1], at, share

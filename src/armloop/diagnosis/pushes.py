@@ -12,7 +12,7 @@ from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import REFINEMENTS
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, NOTICEABLE, enough, leaves_more
-from armloop.diagnosis.line_of_action import point_of_action
+from armloop.diagnosis.line_of_action import force_and_point
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.base import number
@@ -141,9 +141,11 @@ def push(
     along = (_Kind(chosen.effect, link) for link in np.arange(_STEP, n + _STEP, _STEP).tolist())
     points = [_trial(evidence, residual, weight, burst, kind, shown) for kind in along]
     anywhere = [p for p in points if p and p.share >= most - FREEDOM and not p.contradicted]
-    beyond = _off_the_links(evidence, residual, weight, burst, shown) if forceful else None
-    if beyond is not None and chosen.link not in (0, n) and beyond.share <= most + FREEDOM:
-        beyond = None  # the joints beyond its link feel nothing of it
+    if not forceful:
+        return _somewhere(best, anywhere)
+    force, share = _off_the_links(evidence, residual, weight, burst)
+    # the joints beyond another link feel nothing of what pushes that
+    beyond = force if chosen.link in (0, n) or share > most + FREEDOM else None
     return _somewhere(best, anywhere, beyond)
 
 
@@ -157,32 +159,35 @@ def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, 
     return trial if trial is not None and trial.own >= MOSTLY else None
 
 
-def _off_the_links(
-    evidence: Evidence, residual: Array, weight: Array, burst: slice, shown: list[int]
-) -> Contact | None:
-    """The same force on the point of the last link, or of what that holds, on which it explains most."""
-    kind = _Kind(effect("external_contact", None), 0, np.zeros(3))
+def _off_the_links(evidence: Evidence, residual: Array, weight: Array, burst: slice) -> tuple[Array, float]:
+    """The force (3,) on the point of the last link, or of what that holds, on which it explains most, and how much."""
+    arm = evidence.model.arm
+    kind = _Kind(effect("external_contact", None), 0)
     still, *ends = (
         _burst(evidence, residual, weight, burst, replace(kind, point=point))[1]
         for point in (np.zeros(3), *np.eye(3))
     )
+    # what the last link holds is hardly longer than any link
+    away = 0.5 * float(np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).max())
     y = residual[burst] * weight[burst]
-    point = point_of_action(still, [end - still for end in ends], y)
-    return _trial(evidence, residual, weight, burst, replace(kind, point=point), shown)
+    seconds = (burst.stop - burst.start) * evidence.samples.period
+    count = arm.n * max(1, round(seconds / SHORTEST))
+    force, _, share = force_and_point(still, [end - still for end in ends], y, away, NOTICEABLE, count)
+    return force, share
 
 
-def _somewhere(found: Contact, points: list[Contact], beyond: Contact | None = None) -> Contact:
+def _somewhere(found: Contact, points: list[Contact], beyond: Array | None = None) -> Contact:
     """A force on one of these points, nobody knows on which: its error, and its link's, by the law of total variance.
 
     Args:
-        beyond: the same force where on the last link, or on what that holds, it explains most; it may be as far off.
+        beyond: (3,) the force that explains most anywhere on the last link, or on what that holds; it may be as far off.
     """
-    everywhere = (found, *points, *((beyond,) if beyond else ()))
-    forces = [point.added.parameters["force"] for point in everywhere]
+    forces = [point.added.parameters["force"] for point in (found, *points)]
     values, errors = (np.array([getattr(f, of) for f in forces]) for of in ("value", "std_error"))
-    squares = (values - values[0]) ** 2 + errors**2
-    variance = squares[: len(points) + 1].mean(axis=0)
-    error = np.sqrt(np.maximum(variance, squares[-1]) if beyond else variance)
+    variance = np.mean((values - values[0]) ** 2 + errors**2, axis=0)
+    if beyond is not None:
+        variance = np.maximum(variance, (beyond - values[0]) ** 2 + errors[0] ** 2)
+    error = np.sqrt(variance)
     parameters = {**found.added.parameters, "force": replace(forces[0], std_error=error.tolist())}
     if "link" in parameters:
         own = number(parameters["link"].value)
