@@ -21,6 +21,10 @@ def test_the_published_schemas_are_current() -> None:
         assert name in (DOCS / "files.md").read_text(encoding="utf-8")
 
 
+def test_descriptions_are_not_indented_whatever_python_leaves_of_docstrings() -> None:
+    assert all("\\n " not in text for text in schemas().values())
+
+
 @pytest.mark.parametrize(
     ("page", "words"), [("limits.md", "at most {}."), ("files.md", "an arm at most {} joints")]
 )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
+from inspect import cleandoc
 from pathlib import Path
 from typing import Any
 
@@ -55,13 +56,25 @@ def schemas() -> dict[str, str]:
     """The text of each schema by the name of its file."""
     return {
         f"{name}.schema.json": json.dumps(
-            {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(kind)},
+            {
+                "$schema": "https://json-schema.org/draft/2020-12/schema",
+                **_dedented(msgspec.json.schema(kind)),
+            },
             indent=1,
             ensure_ascii=False,
         )
         + "\n"
         for name, kind in FILES.items()
     }
+
+
+def _dedented(part: Any) -> Any:
+    """A schema whose descriptions, which are docstrings, are not indented: as Python 3.13 leaves them, older ones do not."""
+    if isinstance(part, dict):
+        cleaned = {key: _dedented(inner) for key, inner in part.items()}
+        said = cleaned.get("description")
+        return {**cleaned, "description": cleandoc(said)} if isinstance(said, str) else cleaned
+    return [_dedented(inner) for inner in part] if isinstance(part, list) else part
 
 
 if __name__ == "__main__":
