@@ -200,6 +200,7 @@ def test_two_effects_are_told_apart(model: ReconstructedModel) -> None:
     assert answer["effects"][0]["share"] > answer["effects"][1]["share"]
 
 
+@pytest.mark.long
 def test_friction_that_rises_while_a_joint_warms_up_is_a_level_less_what_fades(
     model: ReconstructedModel,
 ) -> None:
@@ -214,6 +215,7 @@ def test_friction_that_rises_while_a_joint_warms_up_is_a_level_less_what_fades(
     assert found["friction_drift", 3]["time_constant"]["value"] == pytest.approx(15.0, rel=0.2)
 
 
+@pytest.mark.long
 def test_a_drag_with_the_cube_of_the_speed_is_not_taken_for_listed_ones(model: ReconstructedModel) -> None:
     def law(motion: Motion) -> np.ndarray:
         return on_joint(motion, 1, 0.4 * motion.v[:, 0] ** 3)

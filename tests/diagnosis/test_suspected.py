@@ -37,7 +37,7 @@ def hints(model: ReconstructedModel, log: MotionLog) -> tuple[str, list[str]]:
     return found.verdict, [reason for reason in found.reasons if "not stated" in reason]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3))])
 def test_a_small_law_is_said_and_not_stated(model: ReconstructedModel, seed: int) -> None:
     """More dry friction by as much as the model leaves: over a minute plain, and less than the worst tenth."""
     small = float(model.baseline["rmse"][1])
@@ -61,14 +61,14 @@ def test_what_the_model_itself_gets_wrong_may_look_like_it(
     assert suspected(evidence_of(poor, log), [], [1]) == []
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 3))])
 def test_of_an_unchanged_arm_nothing_is_said(model: ReconstructedModel, seed: int) -> None:
     assert hints(model, run(seed, 60.0)) == ("no_effect", [])
     # though it be asked
     assert suspected(evidence_of(model, run(seed, 60.0)), [], [0, 1, 2]) == []
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.long)])
 def test_a_law_of_the_whole_arm_goes_before_those_of_its_joints(model: ReconstructedModel, seed: int) -> None:
     motion = motion_of(seed, 60.0)
     tau = torque(motion)

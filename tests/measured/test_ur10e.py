@@ -109,9 +109,8 @@ def test_the_model_is_refused_for_another_arm(
     assert "made for ur10e with 6 joints, not for three_axis with 3" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "name", ["jointwise_joint_1.csv", pytest.param("jointwise_joint_3.csv", marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["jointwise_joint_1.csv", "jointwise_joint_3.csv"])
 def test_joints_that_are_only_shaken_by_another_show_no_effect(
     model: Path, ur10e: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:

@@ -82,7 +82,7 @@ def test_a_coupling_is_found_in_the_training_data(seed: int) -> None:
     assert max(found.held_out.moving["nrmse"]) < 0.05
 
 
-@pytest.mark.parametrize("physical", [True, False])
+@pytest.mark.parametrize("physical", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_a_coupling_of_gears_without_a_motor_has_no_negative_inertia(physical: bool, tmp_path: Path) -> None:
     """Its least-squares estimate is below zero every second time, and a model with a law that cannot be is not read."""
     options = replace(PLAIN, physical=physical)

@@ -167,6 +167,7 @@ def exact(motion: Motion, seed: int) -> MotionLog:
     return replace(log, q=motion.q, v=motion.v.round(7))
 
 
+@pytest.mark.long
 def test_friction_keeps_its_level_where_a_joint_creeps() -> None:
     logs = [exact(fourier_motion(40.0, 100.0, seed), seed) for seed in (1, 2)]
     for library, most in (("rigid-body", 0.01), ("lagrangian", 0.03)):

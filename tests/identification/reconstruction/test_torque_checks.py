@@ -88,7 +88,7 @@ def test_an_arm_without_friction_is_not_accused() -> None:
 
 
 @pytest.mark.measured
-@pytest.mark.parametrize(("every", "joints"), [(9, (1,)), pytest.param(3, range(6), marks=pytest.mark.long)])
+@pytest.mark.parametrize(("every", "joints"), [(20, (1,)), pytest.param(3, range(6), marks=pytest.mark.long)])
 def test_measured_arms_are_not_accused_and_their_faults_are_found(
     every: int, joints: Sequence[int], measured: Path
 ) -> None:
