@@ -28,6 +28,18 @@ def test_whole_turns_from_row_to_row_are_taken_out_of_what_turns(least: float) -
     np.testing.assert_array_equal(found[:, 1:], q[:, 1:])
 
 
+def test_what_changed_between_two_runs_stays() -> None:
+    """A joint that may turn more than once stands somewhere else when the next run begins."""
+    run = np.linspace(0.0, 3.0, 40)
+    q = wrapped(np.concatenate([run + 1.0, run + 1.0 - TURN + 0.1]) + 0.5)[:, None]
+    found, counts = unwrapped(q, np.array([True]), [0, 40])
+    assert counts == [2]
+    for part in (slice(0, 40), slice(40, 80)):
+        assert found[part][0] == q[part][0] and np.abs(np.diff(found[part], axis=0)).max() < 0.1
+    every, _ = unwrapped(q, np.array([True]))
+    assert np.abs(every[40:] - found[40:]).max() > 6.0
+
+
 @pytest.mark.parametrize("turns", [0.5, 1.25, -0.75])
 def test_a_jump_of_no_whole_turn_stays(turns: float) -> None:
     q = np.linspace(0.0, 1.0, 50)[:, None] + TURN * turns * (np.arange(50) > 20)[:, None]

@@ -47,7 +47,14 @@ class TestChoice:
             )  # type: ignore[arg-type]
 
         monkeypatch.setattr(pushes, "_trial", trial)
-        monkeypatch.setattr(pushes, "_somewhere", lambda found, points: found)
+        self.beyond: list[Any] = []
+
+        def somewhere(found: Any, points: Any, beyond: Any = None) -> Any:
+            self.beyond.append(beyond)
+            return found
+
+        monkeypatch.setattr(pushes, "_somewhere", somewhere)
+        monkeypatch.setattr(pushes, "_off_the_links", lambda *_: ("beyond", shares.get("beyond", 0.0)))
         X_tool = np.eye(4)
         X_tool[2, 3] = tool
         evidence: Any = SimpleNamespace(
@@ -104,6 +111,22 @@ class TestChoice:
         )
         # where it explains no more than one at the last joint's place, that is named
         assert self.pushed(monkeypatch, {"f0": 0.86, "f4": 0.9}, 4, tool=0.0) == ("f0", [])
+
+    @pytest.mark.parametrize(
+        ("shares", "joints", "handed_on"),
+        [
+            ({"f0": 0.9, "beyond": 0.9}, 7, ["beyond"]),
+            ({"f4": 0.9, "beyond": 0.94}, 7, [None]),  # of a link the joints beyond it feel nothing
+            ({"f4": 0.9, "beyond": 0.96}, 7, ["beyond"]),  # unless it explains surely more
+            ({"f0": 0.9, "beyond": 0.99}, 3, [None]),  # which three joints cannot tell
+            ({"t1": 0.9, "beyond": 0.99}, 7, []),
+        ],
+    )
+    def test_what_holds_more_than_the_links_may_have_been_pushed_where_all_joints_feel_it(
+        self, shares: Shares, joints: int, handed_on: list[Any], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        self.pushed(monkeypatch, shares, joints)
+        assert self.beyond == handed_on
 
     def test_it_must_explain_half_of_the_joints_that_showed_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert self.pushed(monkeypatch, {"f0": 0.9}, own=0.5) == ("f0", [])

@@ -70,7 +70,8 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     cells = {name: cells[keep] for name, cells in values.items()}
     if not np.any(cells["tau"]):
         raise LogError(f"{where}: the torques are zero throughout; this source did not record them")
-    cells["q"], wraps = unwrapped(cells["q"], np.ones(n, dtype=bool) if arm is None else arm.revolute)
+    turns = np.ones(n, dtype=bool) if arm is None else arm.revolute
+    cells["q"], wraps = unwrapped(cells["q"], turns, _edges(time, starts)[:-1])
     if any(wraps):
         which = ", ".join(f"q{j + 1} ({count} times)" for j, count in enumerate(wraps) if count)
         notes.append(f"angles wrap after a turn: {which}; unwrapped")
@@ -397,13 +398,17 @@ def _spread(time: Array, starts: Sequence[int]) -> Array:
     return time
 
 
+def _edges(time: Array, starts: Sequence[int]) -> list[int]:
+    """Rows at which a run begins, the first one too, and the number of rows."""
+    steps = np.diff(time)
+    gaps = np.flatnonzero((steps > GAP_PERIODS * np.median(steps)) | (steps <= 0)) + 1
+    return sorted({0, len(time), *starts, *(int(k) for k in gaps)})
+
+
 def _differences(time: Array, q: Array, starts: Sequence[int]) -> Array:
     """Central differences within each part and between its gaps, one-sided at the ends: no shift in time."""
     v = np.zeros_like(q)
-    steps = np.diff(time)
-    gaps = np.flatnonzero((steps > GAP_PERIODS * np.median(steps)) | (steps <= 0)) + 1
-    edges = sorted({0, len(time), *starts, *(int(k) for k in gaps)})
-    for first, last in pairwise(edges):
+    for first, last in pairwise(_edges(time, starts)):
         if last - first >= 2:
             v[first:last] = np.gradient(q[first:last], time[first:last], axis=0)
     return v

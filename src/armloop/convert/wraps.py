@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 
 from armloop.convert.recording import Array
@@ -11,19 +14,23 @@ from armloop.util.arrays import Mask
 _WHOLE = 0.2
 
 
-def unwrapped(q: Array, turns: Mask) -> tuple[Array, list[int]]:
+def unwrapped(q: Array, turns: Mask, starts: Sequence[int] = ()) -> tuple[Array, list[int]]:
     """Angles without their jumps of whole turns (Itoh, Applied Optics 21, 1982), and at how many rows each jumps.
 
-    From one row to the next a joint moves by far less than half a turn. What it did in a gap nobody knows: where it is
-    after one it is the nearest angle, for the arm is in the same posture a whole turn on.
+    From one row to the next a joint moves by far less than half a turn. What it did between two runs nobody knows: each
+    begins with the angle that its source says.
 
     Args:
         q: (N, n) positions, rad (m).
         turns: (n,) joints that turn; what slides wraps nowhere.
+        starts: rows at which another run begins.
     """
     step = np.diff(q, axis=0) / (2 * np.pi)
     whole = np.round(step) * turns
     whole[np.abs(step - whole) > _WHOLE] = 0.0
+    inner = [start for start in sorted(starts) if 0 < start < len(q)]
+    whole[[start - 1 for start in inner]] = 0.0
     q = q.copy()
-    q[1:] -= 2 * np.pi * np.cumsum(whole, axis=0)
+    for first, last in pairwise([0, *inner, len(q)]):
+        q[first + 1 : last] -= 2 * np.pi * np.cumsum(whole[first : last - 1], axis=0)
     return q, np.count_nonzero(whole, axis=0).tolist()
