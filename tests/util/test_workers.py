@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from functools import reduce
+from multiprocessing import get_context
 from operator import add
 from typing import Any
 
@@ -160,3 +161,16 @@ def test_a_process_does_not_look_for_garbage_in_what_it_inherited() -> None:
     before = gc.get_freeze_count()
     assert list(Processes(2).map(lambda _: gc.get_freeze_count() > 10_000, range(2))) == [True, True]
     assert gc.get_freeze_count() == before
+
+
+def _within(of: int) -> list[list[int]]:
+    """What a pool and a team of so many processes answer."""
+    with workers.Team(None, of) as team:
+        shared = team.map(lambda held, task, k: k + task, 1, of, lambda done: None)
+    return [list(Processes(of).map(lambda k: k + 1, range(of))), shared]
+
+
+def test_a_daemonic_process_such_as_a_pools_of_the_user_works_alone() -> None:
+    """It may have no children of its own."""
+    with get_context("fork").Pool(1) as pool:
+        assert pool.apply(_within, (3,)) == [[1, 2, 3]] * 2

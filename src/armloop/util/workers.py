@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, suppress
 from functools import lru_cache, wraps
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context
 from threading import Thread
 from typing import Any, ParamSpec, TypeVar
 
@@ -118,7 +118,8 @@ def _die_with(parent: int) -> None:
 
 def team_size(jobs: int | None = None) -> int:
     """How many processes work together: all cores by default, up to :data:`_TEAM`; within another pool's, this one alone."""
-    return 1 if _forked else jobs or min(len(os.sched_getaffinity(0)), _TEAM)
+    alone = _forked or current_process().daemon
+    return 1 if alone else jobs or min(len(os.sched_getaffinity(0)), _TEAM)
 
 
 class Team:
@@ -179,7 +180,7 @@ class Processes(Workers):
 
     def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
         jobs = min(self.jobs, len(chunks))
-        if jobs <= 1:
+        if jobs <= 1 or current_process().daemon:  # a daemonic process may have no children
             yield from Serial().map(function, chunks)
             return
         with Pool(jobs, _hold, (function, chunks)) as pool:
