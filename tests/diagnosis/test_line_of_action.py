@@ -36,3 +36,16 @@ def test_force_and_line_are_those_of_exact_torques(seed: int) -> None:
     one = (sizes[1] / sizes[0] + 1) / 2
     found, _, _ = force_and_point(still, levers, torques, 0.5, one, 100)
     np.testing.assert_allclose(directions[1:] @ found, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("away", [0.0, 0.2])
+@pytest.mark.parametrize("felt", [0.0, 1.0])
+def test_of_joints_without_levers_or_a_force_that_nothing_feels_no_point_is_told(
+    felt: float, away: float
+) -> None:
+    """As of a gantry, all of whose axes slide, and meet in a point."""
+    rng = np.random.default_rng(1)
+    still, force = rng.normal(size=(20, 4, 3)), np.array([1.0, -2.0, 3.0])
+    found, at, share = force_and_point(felt * still, [0 * still] * 3, still @ force, away, 0.03, 10)
+    np.testing.assert_allclose(found, felt * force, atol=1e-9)
+    assert (at == 0).all() and share == pytest.approx(felt)

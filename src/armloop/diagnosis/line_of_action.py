@@ -26,7 +26,7 @@ def force_and_point(
         still: (N, n, 3) torques, weighted, per unit of a force on the frame's origin.
         levers: of each axis of the frame, what a metre along it adds to them.
         y: (N, n) torques, weighted.
-        away: how far along each axis the point usually is, m: the standard deviation of its normal prior.
+        away: how far along each axis the point usually is, m: the standard deviation of its normal prior; 0 for the origin.
         felt: directions that the origin feels less than this part of the one it feels most are none of the force's.
         count: number of independent torques among them, of which what a force on the origin leaves is the noise.
     """
@@ -42,7 +42,7 @@ def force_and_point(
         columns, size = force_at(point)
         return np.asarray(torques - columns @ size)
 
-    prior = float(np.linalg.norm(left(np.zeros(3)))) / (np.sqrt(count) * away)
+    noise = float(np.linalg.norm(left(np.zeros(3)))) / np.sqrt(count)
 
     def slopes(point: Array) -> Array:
         """As Kaufman (BIT 15, 1975): of what a lever adds, the part that no force on the point explains."""
@@ -50,10 +50,14 @@ def force_and_point(
         moved = np.stack([lever @ V @ size for lever in flat[1:]], axis=1)
         return np.asarray(columns @ np.linalg.lstsq(columns, moved, rcond=None)[0] - moved)
 
-    at = least_squares(
-        lambda point: np.concatenate([left(point), prior * point]),
-        np.zeros(3),
-        lambda point: np.concatenate([slopes(point), prior * np.eye(3)]),
-    ).x
+    # in parts of what is usual
+    at = (
+        away
+        * least_squares(
+            lambda parts: np.concatenate([left(away * parts), noise * parts]),
+            np.zeros(3),
+            lambda parts: np.concatenate([away * slopes(away * parts), noise * np.eye(3)]),
+        ).x
+    )
     share = 1 - float(np.sum(left(at) ** 2)) / max(float(torques @ torques), TINY)
     return V @ force_at(at)[1], at, share
