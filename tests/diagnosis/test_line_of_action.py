@@ -28,14 +28,33 @@ def test_force_and_line_are_those_of_exact_torques(seed: int) -> None:
     found, at, share = force_and_point(still, levers, torques, 0.5, 1e-3, 10**9)
     assert np.linalg.norm(found - force) < 1e-3 * np.linalg.norm(force) and share > 1 - 1e-6
     np.testing.assert_allclose(columns(q, at) @ found, torques, atol=1e-3 * np.abs(torques).max())
-    # nearer by what is usual, where little tells of it
-    _, near, less = force_and_point(still, levers, torques, 0.01, 1e-3, 5)
-    assert np.linalg.norm(near) < np.linalg.norm(at) and less < share
     # in no direction that the known point does not feel
     sizes, directions = np.linalg.svd(still.reshape(-1, 3), full_matrices=False)[1:]
     one = (sizes[1] / sizes[0] + 1) / 2
     found, _, _ = force_and_point(still, levers, torques, 0.5, one, 100)
     np.testing.assert_allclose(directions[1:] @ found, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_usual_of_the_point_counts_as_its_prior(seed: int) -> None:
+    """The least of the squares left and of the point in its standard deviations, in units of the noise."""
+    rng = np.random.default_rng(seed)
+    q = fourier_motion(2.0, 100.0, seed, six_joints()).q
+    point, force, away, count = rng.uniform(-0.3, 0.3, 3), rng.normal(size=3), 0.05, 12
+    still, torques = columns(q, np.zeros(3)), columns(q, point) @ force
+
+    def left(at: np.ndarray) -> float:
+        X = columns(q, at).reshape(-1, 3)
+        return float(np.sum((torques.ravel() - X @ np.linalg.lstsq(X, torques.ravel(), rcond=None)[0]) ** 2))
+
+    def cost(at: np.ndarray) -> float:
+        return left(at) + left(np.zeros(3)) / count * float(np.sum((at / away) ** 2))
+
+    levers = [columns(q, axis) - still for axis in np.eye(3)]
+    _, at, share = force_and_point(still, levers, torques, away, 1e-6, count)
+    assert share == pytest.approx(1 - left(at) / np.sum(torques**2))
+    assert all(cost(at) < cost(at + off) for axis in np.eye(3) for off in (0.003 * axis, -0.003 * axis))
+    assert cost(at) < min(cost(np.zeros(3)), cost(point))
 
 
 @pytest.mark.parametrize("away", [0.0, 0.2])

@@ -13,6 +13,7 @@ from armloop.drake.experiments.metrics import Metrics
 from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect
+from armloop.reports import findings as findings_module
 from armloop.reports.diagnosis_tables import diagnosis_table, events_table
 from armloop.reports.findings import findings, nothing_to_supply
 from armloop.reports.tables import (
@@ -55,9 +56,14 @@ def test_eta_stands_beside_the_papers(loop: SimpleNamespace) -> None:
     ],
 )
 def test_a_force_on_a_tool_that_the_urdf_lacks_is_said_to_be_at_the_last_joint(
-    clean: Diagnosis, joint: int | None, more: dict[str, Estimate], tool: float, said: bool
+    clean: Diagnosis,
+    joint: int | None,
+    more: dict[str, Estimate],
+    tool: float,
+    said: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Four fifths of a force's lever may be missing, and its stated error tells nothing of that."""
+    """Four fifths of a force's lever may be missing."""
     name, size = ("external_torque", "torque") if joint else ("external_contact", "force")
     given = {"start": 1.0, "end": 2.0, size: 3.0 if joint else [3.0, 0.0, 0.0]}
     parameters = {key: Estimate(value, value, "") for key, value in given.items()} | more
@@ -68,6 +74,11 @@ def test_a_force_on_a_tool_that_the_urdf_lacks_is_said_to_be_at_the_last_joint(
     text = " ".join(findings(replace(clean, contacts=[contact], model=model)))
     assert ("no link named `tool`" in text) == said
     assert "76 % of the burst" in text
+    # three joints cannot tell where it acted
+    assert ("it was another, by more than its error says" in text) == said
+    monkeypatch.setattr(findings_module, "FEW", 2)
+    text = " ".join(findings(replace(clean, contacts=[contact], model=model)))
+    assert ("it was another, as its error says" in text) == said
 
 
 def test_steps_and_scores(loop: SimpleNamespace) -> None:

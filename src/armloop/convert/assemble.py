@@ -70,8 +70,7 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     cells = {name: cells[keep] for name, cells in values.items()}
     if not np.any(cells["tau"]):
         raise LogError(f"{where}: the torques are zero throughout; this source did not record them")
-    turns = np.ones(n, dtype=bool) if arm is None else arm.revolute
-    cells["q"], wraps = unwrapped(cells["q"], turns, _edges(time, starts)[:-1])
+    cells["q"], wraps = unwrapped(cells["q"], _edges(time, starts)[:-1])
     if any(wraps):
         which = ", ".join(f"q{j + 1} ({count} times)" for j, count in enumerate(wraps) if count)
         notes.append(f"angles wrap after a turn: {which}; unwrapped")

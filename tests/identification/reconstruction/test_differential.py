@@ -51,6 +51,13 @@ def test_a_difference_of_dampings_is_of_the_motor_that_has_more(
     assert (np.abs(found[1].coefficients - truth) < 4 * errors).all() and errors.max() < 0.02
 
 
+@pytest.mark.parametrize("dry", [(0.4, -0.3), (-0.1, 0.4)])
+def test_a_motor_that_drives_is_none(dry: tuple[float, float]) -> None:
+    """Though its damping be plain."""
+    for seed in range(3):
+        assert both(*wrist(dry, (0.2, 0.5), seed), NEW, WORTH) is None
+
+
 @pytest.mark.parametrize("dry", [(0.4, 0.0), (0.0, 0.4), (0.0, 0.0), (0.4, -0.3)])
 def test_one_motor_is_no_differential(dry: tuple[float, float]) -> None:
     for seed in range(3):

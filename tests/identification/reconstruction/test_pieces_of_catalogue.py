@@ -112,3 +112,31 @@ def test_what_acts_alike_on_several_joints_is_filtered_once(
     expected = np.stack([3.0 * sign * (0.5 * wave + np.roll(wave, 1, axis=0)) for sign in signs], axis=1)
     np.testing.assert_allclose(found, expected, atol=1e-12)
     assert calls == [(8, 2)] * filtered
+
+
+def test_two_motors_are_taken_only_where_one_does_not_do_nearly_as_well() -> None:
+    def tried(shapes: int, removed: float) -> Any:
+        return (
+            SimpleNamespace(complexity=3),
+            dict.fromkeys(range(shapes)),
+            SimpleNamespace(removed=removed),
+            1,
+        )
+
+    one, two = tried(1, 0.96), tried(2, 1.0)
+    assert catalogue._simplest([two, one]) is one
+    assert catalogue._simplest([two, tried(1, 0.5)]) is two
+
+
+@pytest.mark.parametrize(("passive", "shapes", "asked"), [(True, 2, 1), (False, 2, 0), (True, 3, 0)])
+def test_of_two_motors_each_has_friction_and_inertia_of_its_own(
+    passive: bool, shapes: int, asked: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another law of two shapes is one of them."""
+    calls: list[Any] = []
+    monkeypatch.setattr(catalogue, "_smoothed", lambda samples, columns: columns)
+    monkeypatch.setattr(catalogue.differential, "both", lambda own, columns, *_: calls.append(columns))
+    law: Any = SimpleNamespace(passive=passive, fixed_columns=lambda context, shape: shape)
+    nothing: Any = None
+    assert catalogue._two_motors(nothing, law, [1.0, -1.0, 2.0][:shapes], nothing, nothing) is None
+    assert calls == [[1.0, -1.0]] * asked

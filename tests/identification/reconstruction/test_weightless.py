@@ -1,13 +1,18 @@
 """Torques of drives that compensate gravity themselves are told by what they are explained by: links without weight."""
 
 import warnings
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
+from armloop.identification.reconstruction.plain_fits import Fit
 from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.identification.reconstruction.weightless import times_lighter
 from armloop.util.errors import InputWarning
 
 
@@ -47,3 +52,33 @@ def test_torques_without_weight_are_taken_and_said_to_be(seed: int) -> None:
 )
 def test_of_weight_that_is_there_or_that_springs_carry_nothing_is_said(log: MotionLog) -> None:
     assert not told(log)
+
+
+@dataclass
+class Arm:
+    """Two joints."""
+
+    gravity: Any
+    n: int = 2
+
+
+@pytest.mark.parametrize(
+    ("relative", "power", "times"),
+    [
+        ([0.1, 0.1], 1.0, 4.0),
+        ([0.27, 0.27], 1.0, 0.0),  # 1.48 times as well may be anything
+        ([0.01, 0.61], 1.0, 0.0),  # of one of the joints most is left
+        ([0.1, 0.1], -1.0, 0.0),  # friction that drives
+    ],
+)
+def test_it_speaks_plainly_of_all_joints_and_physically(
+    relative: list[float], power: float, times: float
+) -> None:
+    def fit(relative: list[float], power: float) -> Fit:
+        return Fit(np.array(relative), np.array([1.0, power]), np.ones(2))
+
+    asked = SimpleNamespace(fit=lambda signs, order: fit(relative, power))
+    problem: Any = SimpleNamespace(
+        arm=Arm(np.array([0.0, 0.0, -9.8])), as_of=lambda arm: None if arm.gravity.any() else asked
+    )
+    assert times_lighter(problem, fit([0.4, 0.4], 1.0)) == pytest.approx(times)

@@ -185,6 +185,10 @@ def permanent(arm: Arm) -> list[Effect]:
     return [e for e in hypotheses(arm) if not (e.rubs or e.memory or e.name in _OF_A_RUN)]
 
 
+#: An effect, its shapes with which of the coefficients of each it has, its trial, and how many shapes were asked.
+_Tried = tuple[Effect, dict[float, Mask | None], Trial, int]
+
+
 def search(
     arm: Arm,
     samples: Samples,
@@ -209,7 +213,7 @@ def search(
     while len(chosen) < _MOST:
         own = bench(chosen)
         taken = {law.effect.place for law in chosen}
-        trials: list[tuple[Effect, dict[float, Mask | None], Trial, int]] = []
+        trials: list[_Tried] = []
         for effect, all_of in zip(listed, shapes, strict=True):
             if effect.place in taken and not effect.periodic:
                 continue
@@ -223,11 +227,7 @@ def search(
                 trials.append((effect, *two, among))
         if not trials:
             break
-        most = max(trial.removed for _, _, trial, _ in trials)
-        as_good = [one for one in trials if one[2].removed >= _AS_GOOD * most]
-        effect, parts, trial, among = min(
-            as_good, key=lambda one: (one[0].complexity * len(one[1]), -one[2].removed)
-        )
+        effect, parts, trial, among = _simplest(trials)
         progress(
             f"{effect.label()}: fitted together with the rest it removes {trial.share:.0%} on left-out blocks"
         )
@@ -236,6 +236,13 @@ def search(
             for shape, kept in parts.items()
         ]
     return Laws(chosen, tried)
+
+
+def _simplest(trials: Sequence[_Tried]) -> _Tried:
+    """The one of the fewest coefficients of those that remove about as much as the best does."""
+    most = max(trial.removed for _, _, trial, _ in trials)
+    as_good = [one for one in trials if one[2].removed >= _AS_GOOD * most]
+    return min(as_good, key=lambda one: (one[0].complexity * len(one[1]), -one[2].removed))
 
 
 def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, samples: Samples) -> Laws:

@@ -21,8 +21,6 @@ def times_lighter(problem: PlainFits, plain: Fit) -> float:
         plain: what is left of it.
     """
     arm = problem.arm
-    if not arm.gravity.any():
-        return 0.0
     light = problem.as_of(replace(arm, gravity=np.zeros(3))).fit(np.ones(arm.n), np.arange(arm.n))
     if light.faults.sum() > plain.faults.sum() or light.relative.max() >= GOOD:
         return 0.0
