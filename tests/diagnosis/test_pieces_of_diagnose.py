@@ -127,7 +127,10 @@ class Answers:
 
     def outcome(self, name: str) -> Any:
         return SimpleNamespace(
-            name=name, found=self.given["found"], added=lambda: [*self.given["found"]], masked=()
+            name=name,
+            found=self.given["found"],
+            added=lambda: [*self.given["found"]],
+            masked=self.given.get("masked", ()),
         )
 
     def best(self, whole: Evidence, contacts: Any, progress: Any, panel: Any) -> Any:
@@ -248,6 +251,17 @@ def test_a_run_that_moves_is_searched(
     assert answers.asked.get("suspected") == small
     part = [] if law is None else ["drag is a part"]
     assert made.reasons == [*part, "stands", "zeros of ['run']"] and made.zeros.tolist() == [[0.1] * 3]
+
+
+@pytest.mark.parametrize(("joint", "asked"), [(1, []), (2, [1])])
+def test_of_a_joint_of_which_something_hidden_is_told_nothing_else_is_suspected(
+    joint: int, asked: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hidden = SimpleNamespace(effect=effect("viscous_friction", joint + 1))
+    answers = Answers(monkeypatch, masked=(hidden,))
+    reasons = judged(jobs=2).reasons
+    assert answers.asked["suspected"] == ("account", [], asked)
+    assert any("viscous_friction at joint 2 would explain" in reason for reason in reasons) == (not asked)
 
 
 def test_the_account_with_a_load_takes_the_place_of_that_without(monkeypatch: pytest.MonkeyPatch) -> None:

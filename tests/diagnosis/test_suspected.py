@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from rubbing_arm import model_with_baseline, motion_of, run, torque
+from scores import score
 from synthetic import measured
 
 from armloop.data.log import MotionLog
 from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose
+from armloop.diagnosis import suspected as module
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.reasons import too_small
+from armloop.diagnosis.reasons import too_little
 from armloop.diagnosis.suspected import suspected
-from armloop.laws.effects import hypotheses
+from armloop.laws.effects import effect, hypotheses
 from armloop.model import ReconstructedModel
 
 
@@ -55,9 +59,8 @@ def test_what_the_model_itself_gets_wrong_may_look_like_it(
     joints = [{"joint": j + 1, **known} for j in range(3)]
     poor = replace(model, baseline={**model.baseline, "joints": joints})
     log = run(1, 60.0, float(model.baseline["rmse"][1]))
-    assert [e.label() for e, _, _ in suspected(evidence_of(model, log), [], [1])] == [
-        "coulomb_friction at joint 2"
-    ]
+    (one,) = suspected(evidence_of(model, log), [], [1])
+    assert (one.effect.label(), one.joints, one.small) == ("coulomb_friction at joint 2", (1,), True)
     assert suspected(evidence_of(poor, log), [], [1]) == []
 
 
@@ -74,11 +77,71 @@ def test_a_law_of_the_whole_arm_goes_before_those_of_its_joints(model: Reconstru
     tau = torque(motion)
     late = np.column_stack([np.interp(motion.time - 0.006, motion.time, x) for x in tau.T])
     evidence = evidence_of(model, measured(motion, late, seed, 0.01))
-    ((effect, joints, share),) = suspected(evidence, [], [0, 1, 2])
-    assert (effect.name, joints) == ("time_delay", (0, 1, 2)) and 0.75 <= share <= 1.0
+    (one,) = suspected(evidence, [], [0, 1, 2])
+    assert (one.effect.name, one.joints) == ("time_delay", (0, 1, 2)) and 0.75 <= one.share <= 1.0
     # of one joint alone a delay of the record is not asked
-    assert {e.joint for e, _, _ in suspected(evidence, [], [1])} <= {2}
+    assert {each.effect.joint for each in suspected(evidence, [], [1])} <= {2}
 
 
-def test_the_sentence_names_the_joints() -> None:
-    assert too_small("time_delay", (0, 2), 0.5).startswith("joints 1, 3: time_delay would explain 50%")
+@pytest.mark.parametrize(
+    ("left", "after", "known", "said"),
+    [
+        # of 100 rows in 20 blocks: what lies beyond the baseline is 60, and three quarters of it are asked
+        (160.0, 110.0, {}, True),
+        (160.0, 116.0, {}, False),
+        (160.0, 110.0, {"predictable_left": 0.2, "std_error": 0.01, "noise": 0.8}, True),  # 23 of 100
+        (160.0, 110.0, {"predictable_left": 0.2, "std_error": 0.2, "noise": 0.8}, False),  # or up to 80
+        (160.0, 110.0, {"predictable_left": 0.6, "std_error": 0.0, "noise": 0.4}, False),
+    ],
+)
+def test_it_explains_most_and_more_than_could_be_predicted_of_what_the_model_leaves(
+    left: float, after: float, known: dict[str, float], said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = asked_of(
+        monkeypatch, left, after, known or {"predictable_left": 0.0, "std_error": 0.0, "noise": 1.0}
+    )
+    assert [(each.effect.name, each.joints) for each in found] == [("coulomb_friction", (0,))] * said
+    if said:
+        assert found[0].share == pytest.approx((left - after) / 60.0) and found[0].small
+
+
+def test_what_is_more_than_the_worst_tenth_is_not_said_to_be_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    (one,) = asked_of(monkeypatch, 260.0, 101.0, {})
+    assert not one.small and one.share == pytest.approx(159.0 / 160.0)
+
+
+@pytest.mark.parametrize(("errors", "laws", "said"), [(3.5, 1, True), (3.5, 30, False), (5.2, 30, True)])
+def test_it_is_no_chance_though_so_many_laws_were_asked(
+    errors: float, laws: int, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of three standard errors, by Student's t of 20 blocks."""
+    monkeypatch.setattr(module, "lead", lambda before, after: errors)
+    assert bool(asked_of(monkeypatch, 160.0, 110.0, NOISE, laws)) == said
+
+
+NOISE = {"predictable_left": 0.0, "std_error": 0.0, "noise": 1.0}
+
+
+def asked_of(
+    monkeypatch: pytest.MonkeyPatch, left: float, after: float, known: dict[str, float], laws: int = 1
+) -> list[module.Suspected]:
+    """What is suspected at one joint, where so much is left and the first of some laws would leave so much."""
+    effects = [effect("coulomb_friction", 1)] * laws
+    monkeypatch.setattr(module, "hypotheses", lambda arm: effects)
+    monkeypatch.setattr(module, "log_posterior", lambda evidence, score, effects: -score.error)
+    trial = SimpleNamespace(score=score(after, blocks=20))
+    given = SimpleNamespace(fit=SimpleNamespace(score=score(left, blocks=20)), trial=lambda effect: trial)
+    monkeypatch.setattr(module.Known, "of", staticmethod(lambda *_: given))
+    model = SimpleNamespace(arm=None, baseline={"joints": [known]})
+    evidence: Any = SimpleNamespace(
+        model=model, scale=np.ones(1), variation=np.ones(1), blocks=np.repeat(np.arange(20), 5)
+    )
+    return suspected(evidence, [], [0])
+
+
+@pytest.mark.parametrize(
+    ("small", "why"), [(True, "no more than the model leaves at its worst"), (False, "all that is asked")]
+)
+def test_the_sentence_names_the_joints(small: bool, why: str) -> None:
+    said = too_little("time_delay", (0, 2), 0.5, small)
+    assert said.startswith("joints 1, 3: time_delay would explain 50%") and why in said

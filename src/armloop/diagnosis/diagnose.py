@@ -39,7 +39,7 @@ from armloop.diagnosis.reasons import (
     in_doubt,
     masked,
     standing,
-    too_small,
+    too_little,
     too_still,
 )
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
@@ -393,7 +393,8 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     if unlisted is None and turned is None:
         unsaid = sorted(set(stand.left) - {j for each in outcome.masked for j in each.effect.indices})
         doubted += [
-            too_small(e.label(), of, part) for e, of, part in suspected(evidence, outcome.found, unsaid)
+            too_little(each.effect.label(), each.joints, each.share, each.small)
+            for each in suspected(evidence, outcome.found, unsaid)
         ]
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))

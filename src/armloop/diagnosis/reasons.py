@@ -140,12 +140,17 @@ def masked(added: AddedEffect) -> str:
     )
 
 
-def too_small(label: str, joints: Sequence[int], share: float) -> str:
-    """A sentence on a law that is no chance in the run at joints (0-based), but no larger than the model's own errors."""
+def too_little(label: str, joints: Sequence[int], share: float, small: bool) -> str:
+    """A sentence on a law that is no chance in the run at joints (0-based), and not stated, because it is small or else."""
     where = f"joint{'s' * (len(joints) > 1)} {', '.join(str(j + 1) for j in joints)}"
+    why = (
+        "it explains no more than the model leaves at its worst on its own training logs"
+        if small
+        else "it does not pass all that is asked of a law"
+    )
     return (
-        f"{where}: {label} would explain {share:.0%} of what is left beyond the baseline, which is no chance, but no "
-        "more than the model leaves at its worst on its own training logs: it is not stated"
+        f"{where}: {label} would explain {share:.0%} of what is left beyond the baseline, which is no chance; it is not "
+        f"stated, for {why}"
     )
 
 

@@ -9,13 +9,14 @@ not know well may look the same, so it is said, and no verdict.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import MOST, SIGNIFICANCE, gain, lead
+from armloop.diagnosis.judgement import MOST, SIGNIFICANCE, gain, lead, times_enough
 from armloop.diagnosis.outcomes import Found
 from armloop.diagnosis.search import log_posterior
 from armloop.diagnosis.trials import Known
@@ -23,22 +24,25 @@ from armloop.laws.effects import Effect, hypotheses
 from armloop.util.arrays import TINY, Array
 
 
-def _shortcomings(evidence: Evidence) -> Array:
-    """(n,) squared error, weighted, a row, of each joint that could be predicted of what the model leaves on the worst tenth
-    of its training data; all of it where that was not asked."""
-    parts = np.ones(len(evidence.scale))
-    for j, joint in enumerate(evidence.model.baseline.get("joints") or []):
-        left, error, noise = (joint.get(key) for key in ("predictable_left", "std_error", "noise"))
-        if None not in (left, error, noise):
-            parts[j] = min((left + SIGNIFICANCE * error) / max(left + noise, TINY), 1.0)
-    return np.asarray(parts * evidence.variation)
+@dataclass(frozen=True)
+class Suspected:
+    """A law that is no chance in a run, and not stated.
+
+    Attributes:
+        joints: those (0-based) at which nothing is named.
+        share: part of what is left there beyond the baseline that it explains.
+        small: whether that is no more than the model leaves on the worst tenth of its training data.
+    """
+
+    effect: Effect
+    joints: tuple[int, ...]
+    share: float
+    small: bool
 
 
-def suspected(
-    evidence: Evidence, found: Sequence[Found], joints: Sequence[int]
-) -> list[tuple[Effect, tuple[int, ...], float]]:
-    """Laws that are the likeliest of joints (0-based) that nothing is named at, these joints, and which part of what is left
-    there beyond the baseline each explains; none where that is not most of it, or may be chance.
+def suspected(evidence: Evidence, found: Sequence[Found], joints: Sequence[int]) -> list[Suspected]:
+    """Laws that are the likeliest of joints (0-based) that nothing is named at; none where what they explain is not most of
+    what is left there, or may be chance.
 
     Of several joints a law of all of them is asked, too, and goes first if it is the likeliest: a delay is none of a joint.
 
@@ -60,7 +64,7 @@ def suspected(
     blocks = len(np.unique(evidence.blocks))
     surely = float(student.isf(norm.sf(SIGNIFICANCE) / len(asked), max(blocks - 1, 1)))
     least = _shortcomings(evidence)
-    said: list[tuple[Effect, tuple[int, ...], float]] = []
+    said: list[Suspected] = []
     while bare:
         # a law of the whole arm lists no joints
         mine = [(e, score) for e, score in trials if e.joint is None or set(e.indices) & set(bare)]
@@ -73,8 +77,20 @@ def suspected(
         more = gain(before, after) > float((least * current.rows)[some].sum())
         part = gain(before, after) / max(float(np.maximum(before.excess, 0.0).sum()), TINY)
         if more and part >= MOST and lead(before, after) > surely:
-            said.append((effect, of, min(part, 1.0)))
+            small = times_enough(evidence, current, score) <= 1
+            said.append(Suspected(effect, of, min(part, 1.0), small))
             bare = [j for j in bare if j not in of]
         else:
             trials = [each for each in trials if each[0] is not effect]
     return said
+
+
+def _shortcomings(evidence: Evidence) -> Array:
+    """(n,) squared error, weighted, a row, of each joint that could be predicted of what the model leaves on the worst tenth
+    of its training data; all of it where that was not asked."""
+    parts = np.ones(len(evidence.scale))
+    for j, joint in enumerate(evidence.model.baseline.get("joints") or []):
+        left, error, noise = (joint.get(key) for key in ("predictable_left", "std_error", "noise"))
+        if None not in (left, error, noise):
+            parts[j] = min((left + SIGNIFICANCE * error) / max(left + noise, TINY), 1.0)
+    return np.asarray(parts * evidence.variation)
