@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from armloop.diagnosis.diagnose import Diagnosis, diagnose
+from armloop.diagnosis.suspected import Suspected
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.laws.effects import effect
 from armloop.model import ReconstructedModel
@@ -98,7 +99,7 @@ class Answers:
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
         parts["suspected"] = lambda evidence, found, left: self.note(
-            "suspected", (evidence.name, found, left), []
+            "suspected", (evidence.name, found, left), self.given.get("suspected", [])
         )
         for name, part in parts.items():
             monkeypatch.setattr(module, name, part)
@@ -258,10 +259,15 @@ def test_of_a_joint_of_which_something_hidden_is_told_nothing_else_is_suspected(
     joint: int, asked: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hidden = SimpleNamespace(effect=effect("viscous_friction", joint + 1))
-    answers = Answers(monkeypatch, masked=(hidden,))
+    law = Suspected(effect("coulomb_friction", 2), (1,), 0.8, small=bool(asked))
+    answers = Answers(monkeypatch, masked=(hidden,), suspected=[law])
     reasons = judged(jobs=2).reasons
     assert answers.asked["suspected"] == ("account", [], asked)
     assert any("viscous_friction at joint 2 would explain" in reason for reason in reasons) == (not asked)
+    (said,) = [
+        reason for reason in reasons if "joint 2: coulomb_friction at joint 2 would explain 80%" in reason
+    ]
+    assert ("no more than the model leaves" in said) == bool(asked)
 
 
 def test_the_account_with_a_load_takes_the_place_of_that_without(monkeypatch: pytest.MonkeyPatch) -> None:
