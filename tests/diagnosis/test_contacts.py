@@ -96,6 +96,39 @@ def test_torques_on_two_joints_that_account_for_one_burst_are_two_events() -> No
     assert len(contacts._distinct(given, [both[0], force])) == 1
 
 
+@pytest.mark.parametrize(
+    ("left", "errors", "shown", "stands"),
+    [
+        ((3.1, 0.0), ((1.0, 0.0), (0.0, 0.0)), (0, 1), True),  # three standard errors are no chance
+        ((2.9, 0.0), ((1.0, 0.0), (0.0, 0.0)), (0, 1), False),
+        ((-3.1, 2.9), ((1.0, 0.0), (0.0, 1.0)), (0, 1), True),  # any joint that shows it
+        ((9.0, 2.9), ((1.0, 0.0), (0.0, 1.0)), (1,), False),  # and no other
+        ((4.9, 0.0), ((1.0, 1.4), (0.0, 0.0)), (0,), False),  # what a model errs by in several ways adds up
+        ((0.1, 0.0), (), (0,), True),  # a model that keeps no errors is taken at its word
+    ],
+)
+def test_what_the_model_itself_may_err_by_is_no_event(
+    left: tuple[float, ...], errors: tuple[tuple[float, ...], ...], shown: tuple[int, ...], stands: bool
+) -> None:
+    """On average over the event, at samples that the filter leaves apart; before and after they may be anything."""
+    given, rows = motion((100,)), np.zeros(100, dtype=bool)
+    rows[35:65] = True
+    inside = np.arange(40, 60)
+    residual, own = np.full((100, 2), 99.0), np.full((100, 2, len(errors[0]) if errors else 0), -99.0)
+    own[inside] = np.array(errors).reshape(2, -1) if errors else 0.0
+    own[inside[::4]] *= 2.0  # the mean is of all of them
+    own[inside[2::4]] *= 0.0
+    residual[inside] = left
+    apart = np.arange(0, 100, 2)
+    evidence: Any = SimpleNamespace(
+        samples=SimpleNamespace(motion=given), independent=apart, errors=own[apart]
+    )
+    found: Any = SimpleNamespace(added=event(3.95, 5.95), rows=rows, shown=frozenset(shown))
+    assert contacts._beyond_errors(evidence, residual, found) == stands
+    found.added = event(3.91, 3.95)
+    assert contacts._beyond_errors(evidence, residual, found)
+
+
 class TestFinding:
     """Joint 1 and joint 2 have bursts where they are given; what is pushed is told of them."""
 
@@ -132,6 +165,11 @@ class TestFinding:
             return bursts
 
         monkeypatch.setattr(contacts, "_standing_out", standing_out)
+        monkeypatch.setattr(
+            contacts,
+            "_beyond_errors",
+            lambda evidence, residual, one: not one.rows[list(of.get("erring", ()))].any(),
+        )
         monkeypatch.setattr(contacts, "turning", lambda motion, moving: np.arange(200).reshape(100, 2) < 60)
         monkeypatch.setattr(contacts, "at_rest", lambda samples: np.arange(200).reshape(100, 2) >= 180)
         monkeypatch.setattr(contacts, "outlying", lambda evidence, residual: [slice(10, 20), slice(60, 70)])
@@ -262,6 +300,9 @@ class TestFinding:
         monkeypatch.setattr(contacts, "_explains_both", lambda evidence, one, first, then: False)
         self.pushed(monkeypatch, *bursts, push=push)
         assert self.events == [5, 5, 5]
+        # what the model itself may err by is none of them
+        self.pushed(monkeypatch, *bursts, push=push, erring=[32])
+        assert self.events == [5, 5]
         # too long to be one: more than two fifths of what the joints do
         monkeypatch.setattr(contacts, "_explains_both", lambda evidence, one, first, then: True)
         self.pushed(monkeypatch, (20, 25, 0), (56, 61, 0), push=push)

@@ -105,7 +105,10 @@ class TestReasons:
         assert real(0.1, 0.05, 0.9) is False and real(0.1, 0.11, 0.9) is None
         assert real(0.1, 0.05, 0.9, apart=False) is None
 
-    @pytest.mark.parametrize(("moves", "blocks", "still"), [(20, 8, ""), (19, 8, "[1, 2]"), (20, 7, "[2]")])
+    @pytest.mark.parametrize(
+        ("moves", "blocks", "still"),
+        [(20, 8, ""), (19, 8, "joints 1, 2 hardly slide"), (20, 7, "joint 2 hardly slides")],
+    )
     def test_too_little_motion(self, moves: int, blocks: int, still: str) -> None:
         given = motion((100,), 2)
         given.v[:moves, 0], given.v[moves:, 0], given.v[:, 1] = -0.011, 0.01, 0.002
@@ -119,10 +122,21 @@ class TestReasons:
             ),
         )
         words = reasons.too_still(evidence)
-        assert not still or (f"({blocks} blocks of 0.8 s" in words and "log at least 7.2 s in which" in words)
-        assert bool(words) == bool(still) and (not still or f"motion does not count: {still})" in words)
+        wanted = f"({blocks} blocks of 0.8 s or more; {still}); log at least 7.2 s in which the joints move"
+        assert words == (f"too little motion to judge {wanted}" if still else "")
         evidence.rows[:, 0] = False
-        assert "motion does not count: [1, 2]" in reasons.too_still(evidence)
+        assert "; joints 1, 2 hardly slide)" in reasons.too_still(evidence)
+
+    def test_too_few_blocks_in_which_all_joints_slide(self) -> None:
+        given = motion((100,), 2)
+        given.v[:] = 1.0
+        evidence: Any = SimpleNamespace(
+            rows=np.ones((100, 2), dtype=bool),
+            samples=SimpleNamespace(motion=given),
+            blocks=np.arange(100) // 20,
+            model=SimpleNamespace(history=SimpleNamespace(get=lambda _: [[1, 1]] * 3), baseline={}),
+        )
+        assert "(5 blocks of 1 s or more); log" in reasons.too_still(evidence)
 
     @staticmethod
     def standing(monkeypatch: pytest.MonkeyPatch, after: Any, **of: Any) -> Any:

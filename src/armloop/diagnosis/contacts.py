@@ -16,7 +16,7 @@ from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside, near_standstill
 from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innovations
-from armloop.diagnosis.judgement import FREEDOM, MOSTLY, MULTIPLE
+from armloop.diagnosis.judgement import FREEDOM, MOSTLY, MULTIPLE, SIGNIFICANCE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import FEW, PAUSE, SHORTEST, Contact, around, push, torque_on
@@ -111,7 +111,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
                 events[-1] = one
                 continue
         events.append(contact)
-    return events
+    return [event for event in events if _beyond_errors(evidence, residual, event)]
 
 
 def _one_or_each(
@@ -244,6 +244,20 @@ def _seen_whole(motion: Motion, contact: Contact) -> bool:
     run = next(run for run in motion.runs() if contact.rows[run].any())
     time = motion.time[run]
     return bool(start - time[0] >= SHORTEST and time[-1] - end >= SHORTEST)
+
+
+def _beyond_errors(evidence: Evidence, residual: Array, event: Contact) -> bool:
+    """Whether what is left of a joint that shows an event is clear, on average over it, of the model's own errors.
+
+    A model of little data may err by far more where the arm has not been, for a while, as if something pushed.
+    """
+    start, end = ends(event.added.parameters)
+    time = evidence.samples.motion.time[evidence.independent]
+    inside, shown = event.rows[evidence.independent] & (time >= start) & (time <= end), sorted(event.shown)
+    if not inside.any():
+        return True
+    left, errors = residual[evidence.independent][inside].mean(axis=0), evidence.errors[inside].mean(axis=0)
+    return bool((np.abs(left) > SIGNIFICANCE * np.linalg.norm(errors, axis=1))[shown].any())
 
 
 def _rare(rows: Mask, bursts: list[Burst]) -> list[Burst]:

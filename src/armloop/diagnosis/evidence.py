@@ -180,13 +180,8 @@ class Evidence:
     @cached_property
     def _model_errors(self) -> Array:
         """(R, r) torque of the model's own errors at the rows that count, weighted."""
-        errors = self._of_motion.of(
-            (("the model's own errors", None, None), None),
-            0.0,
-            lambda: torque_errors(self.model, self.samples)[self.independent],
-        )
         _, places, joints = self.stacking
-        return np.asarray(errors[self._places[places], joints] / self.scale[joints, None])
+        return np.asarray(self.errors[self._places[places], joints] / self.scale[joints, None])
 
     @cached_property
     def kept(self) -> Index:
@@ -203,6 +198,15 @@ class Evidence:
     def independent(self) -> Index:
         """(M,) samples of which the filter has left each something of its own to say."""
         return np.flatnonzero(independent_rows(self.samples))
+
+    @property
+    def errors(self) -> Array:
+        """(M, n, r) torque of the model's own errors at :attr:`independent` samples, one standard deviation each."""
+        return self._of_motion.of(
+            (("the model's own errors", None, None), None),
+            0.0,
+            lambda: torque_errors(self.model, self.samples)[self.independent],
+        )
 
     def smoothed(self, effect: Effect, shape: float) -> Array:
         """(M, p) columns of an effect on its joint, or (M, n, p) on all, through the run's filter, at

@@ -113,15 +113,19 @@ def _all_over(model: ReconstructedModel, multiples: int, judged: int) -> str:
 def too_still(evidence: Evidence) -> str:
     """What keeps a run from being judged, empty if nothing does."""
     moving = evidence.rows & (np.abs(evidence.samples.motion.v) > creep(evidence.model))
-    still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < _FEWEST]
+    still = [j for j, rows in enumerate(moving.T) if rows.sum() < _FEWEST]
     blocks = len(np.unique(evidence.blocks))
     if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
         return ""
     shortest = shortest_block(evidence.model)
-    return (
-        f"too little motion to judge ({blocks} blocks of {shortest:.2g} s or more, joints whose motion does not count: "
-        f"{still}); log at least {(FEWEST_BLOCKS + 1) * shortest:.2g} s in which the joints move"
-    )
+    of = f"{blocks} blocks of {shortest:.2g} s or more"
+    of += f"; {_named(still)} hardly slide{'s' * (len(still) == 1)}" if still else ""
+    return f"too little motion to judge ({of}); log at least {(FEWEST_BLOCKS + 1) * shortest:.2g} s in which the joints move"
+
+
+def _named(joints: Sequence[int]) -> str:
+    """Such as ``joints 1, 2``, of joints (0-based)."""
+    return f"joint{'s' * (len(joints) > 1)} {', '.join(str(j + 1) for j in joints)}"
 
 
 def in_doubt(label: str, share: float) -> str:
@@ -142,15 +146,14 @@ def masked(added: AddedEffect) -> str:
 
 def too_little(label: str, joints: Sequence[int], share: float, small: bool) -> str:
     """A sentence on a law that is no chance in the run at joints (0-based), and not stated, because it is small or else."""
-    where = f"joint{'s' * (len(joints) > 1)} {', '.join(str(j + 1) for j in joints)}"
     why = (
         "it explains no more than the model leaves at its worst on its own training logs"
         if small
         else "it does not pass all that is asked of a law"
     )
     return (
-        f"{where}: {label} would explain {share:.0%} of what is left beyond the baseline, which is no chance; it is not "
-        f"stated, for {why}"
+        f"{_named(joints)}: {label} would explain {share:.0%} of what is left beyond the baseline, which is no chance; it "
+        f"is not stated, for {why}"
     )
 
 
