@@ -14,6 +14,7 @@ from rubbing_arm import model_with_baseline, motion_of, torque
 from synthetic import measured, three_axis
 
 from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.diagnosis import carried as carrying
@@ -21,6 +22,7 @@ from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.carried import account_with_load, find_carried
 from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.load_direction import pulls_down
 from armloop.diagnosis.next_run import next_run
 from armloop.laws.effects import Context, effect, hypotheses
 from armloop.laws.effects.payload import Payload
@@ -43,6 +45,14 @@ def run(
         inside = (motion.time >= first) & (motion.time < last)
         tau[inside] += extra[inside]
     return replace(measured(motion, tau, seed, 0.01), name=f"run{seed}")
+
+
+def push_of(motion: Motion, pushed: dict[str, Any]) -> np.ndarray:
+    """(N, n) torque of a force on the centre of the load, in the base frame."""
+    arm = three_axis()
+    X_tool = arm.X_tool.copy()
+    X_tool[:3, 3] += X_tool[:3, :3] @ LOAD["com"]
+    return effect("external_contact", None).torque(Context(replace(arm, X_tool=X_tool), motion), pushed)
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +121,38 @@ def test_a_load_carried_at_times_is_found_with_its_mass_and_when(
     assert "kg on the last link" in words and "carried from 2.5 to 7.0, 11.0 to 16.0, 21.0 to 24.5 s" in words
 
 
+@pytest.mark.parametrize("seed", [5, *(pytest.param(k, marks=pytest.mark.long) for k in (6, 7))])
+def test_what_was_gripped_and_let_go_once_is_a_load_and_no_push(model: ReconstructedModel, seed: int) -> None:
+    """A push, too, comes and goes; the force of a load points straight down."""
+    ((first, last),) = times = [(8.0, 14.0)]
+    found = diagnose(model, [run(seed, times)], jobs=1)
+    assert found.named == [("carried_load", None)] and found.contacts == []
+    (added,) = found.outcome.added()
+    ends = np.hstack([added.parameters[key].value for key in ("picked_up", "put_down")])
+    np.testing.assert_allclose(ends, (first, last), atol=0.1)
+    assert abs(float(np.asarray(added.parameters["mass"].value)) - 0.4) < 0.01
+    log = run(seed, [])
+    push = push_of(motion_of(seed, 30.0), {"start": first, "end": last, "force": [1.6, -1.2, -2.0]})
+    found = diagnose(model, [replace(log, tau=log.tau + push)], jobs=1)
+    assert {name for name, _ in found.named} <= {"external_contact", "external_torque"} and found.contacts
+
+
+@pytest.mark.parametrize(("sideways", "weight"), [(0.0, True), (0.08, True), (0.12, False), (0.5, False)])
+def test_a_weight_pulls_straight_down(model: ReconstructedModel, sideways: float, weight: bool) -> None:
+    """As far as the direction of gravity is known; along the plane that the joints do not feel nobody knows."""
+    given = evidence(model, run(3, [(8.0, 14.0)]))
+    load, _ = find_carried(given) or (None, None)
+    assert load is not None
+    there = load.carried(given.samples.motion)
+    time = given.samples.motion.time
+    assert there[(time > 8.1) & (time < 13.9)].all() and not there[(time < 7.9) | (time > 14.1)].any()
+    force = sideways * 9.81 * LOAD["mass"] * np.array([0.6, 0.8, 0.0])
+    pushed = {"start": 8.0, "end": 14.0, "force": force}
+    tilted = replace(given.samples, tau=given.samples.tau + push_of(given.samples.motion, pushed))
+    known = carrying.Known.of(replace(given, samples=tilted), [load], [carrying._shape(load)])
+    assert pulls_down(known, there) is weight
+
+
 def test_the_augmented_model_knows_it_in_that_log_alone_and_no_controller_supplies_it(
     model: ReconstructedModel, carried: Diagnosis
 ) -> None:
@@ -168,14 +210,14 @@ def test_what_is_beside_a_load_is_found_too(model: ReconstructedModel, seed: int
         (3.9, None, [], [], False),
         (4.1, None, [], [], True),
         (0.0, "a law", [], [], True),
-        (0.0, None, [None], [], False),
-        (0.0, None, [None, 2], [], False),
-        (0.0, None, [None, None], [], True),
+        (0.0, None, [], [], False),
+        (0.0, None, [None], [], True),
+        (0.0, None, [2], [], True),
         (0.0, None, [], ["coulomb_friction"], False),
         (0.0, None, [], ["coulomb_friction", "payload"], True),
     ],
 )
-def test_it_is_asked_where_much_is_left_a_load_is_named_or_several_forces_came_and_went(
+def test_it_is_asked_where_much_is_left_a_load_is_named_or_something_came_and_went(
     left: float, law: str | None, events: list[int | None], named: list[str], asked: bool
 ) -> None:
     score = SimpleNamespace(energy=np.array([0.0, 10 * left]), rows=np.array([10, 10]))

@@ -13,7 +13,7 @@ from scipy.stats import norm
 from armloop.diagnosis import compensation, fit, next_run, trials
 from armloop.diagnosis.compensation import FeedforwardChange
 from armloop.diagnosis.evidence import Stacked
-from armloop.diagnosis.fit import Fit, Shape, Solution, _wald, deviate
+from armloop.diagnosis.fit import Fit, Shape, Solution, deviate, wald_statistic
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Estimate
 from armloop.regression.clustered import clustered_covariance
@@ -397,19 +397,22 @@ class TestTogether:
         A = rng.normal(size=(3, 3))
         x, spread = rng.normal(size=3), A @ A.T
         expected = float(np.sum(np.linalg.solve(np.linalg.cholesky(spread), x) ** 2))
-        assert _wald(x, spread) == (pytest.approx(expected, rel=1e-5), 3)
+        assert wald_statistic(x, spread) == (pytest.approx(expected, rel=1e-5), 3)
         # in other units it is the same
         units = np.array([1e-4, 1.0, 1e5])
-        assert _wald(units * x, np.outer(units, units) * spread) == (pytest.approx(expected, rel=1e-5), 3)
+        assert wald_statistic(units * x, np.outer(units, units) * spread) == (
+            pytest.approx(expected, rel=1e-5),
+            3,
+        )
 
     def test_what_nobody_knows_says_nothing(self) -> None:
         spread = np.diag([4.0, np.inf, 0.0])
-        assert _wald(np.array([3.0, 7.0, 7.0]), spread) == (pytest.approx(9 / 4, rel=1e-6), 1)
-        assert _wald(np.array([7.0]), np.array([[np.inf]])) == (0.0, 0) and deviate(0.0, 0) == 0.0
+        assert wald_statistic(np.array([3.0, 7.0, 7.0]), spread) == (pytest.approx(9 / 4, rel=1e-6), 1)
+        assert wald_statistic(np.array([7.0]), np.array([[np.inf]])) == (0.0, 0) and deviate(0.0, 0) == 0.0
 
     def test_two_that_are_alike_may_be_plain_though_neither_is(self) -> None:
         spread = np.array([[1.0, -0.99], [-0.99, 1.0]])  # their sum is known to 0.14
-        chi_square, freedom = _wald(np.array([0.5, 0.5]), spread)
+        chi_square, freedom = wald_statistic(np.array([0.5, 0.5]), spread)
         assert chi_square == pytest.approx(0.5 / 0.01, rel=1e-5) and freedom == 2
 
     def test_as_unlikely_as_a_normal_variable(self) -> None:

@@ -3,7 +3,7 @@
 Load and intervals are found in turn (hard expectation maximisation). The load being given, the likeliest sequence of carried
 and not carried follows by dynamic programming (Viterbi 1967), each change at a price; the sequence being given, the load is
 regressed. It is looked for where the effects found leave more than the model's own shortcomings or are a load themselves, or
-several forces came and went, and taken if what is then left is far less: what comes and goes is no law of the motion, and a
+something came and went, and taken if what is then left is far less: what comes and goes is no law of the motion, and a
 search for laws would find the nearest. When the load is carried, all samples say; how heavy it is, only those outside the
 fold that is judged.
 """
@@ -26,6 +26,7 @@ from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import MOSTLY, much_is_left
+from armloop.diagnosis.load_direction import pulls_down
 from armloop.diagnosis.outcomes import Found
 from armloop.diagnosis.search import ROUNDS
 from armloop.diagnosis.trials import Known
@@ -62,6 +63,8 @@ def account_with_load(
     plain = known_part(whole, unknown)
     known = Known.of(plain, [load], [_shape(load)])
     if not load.plausible(whole.model.arm, known.fit.parameters[0]):
+        return None
+    if not pulls_down(known, load.carried(whole.samples.motion)):
         return None
     # beside what was found it must explain most of what that leaves; only then is all else searched anew
     if not _explains_most(
@@ -109,14 +112,13 @@ def _found(load: CarriedLoad) -> Found:
 
 
 def _is_asked(account: Account) -> bool:
-    """Whether a law or a load was named, some joint's error is a multiple of the baseline, or there were several forces.
+    """Whether a law or a load was named, some joint's error is a multiple of the baseline, or there was an event.
 
-    What comes and goes may be one thing that is gripped and let go, again and again; a load may have been there at times.
+    What is gripped and let go, once or again and again, looks like a push; a load may have been there at times.
     """
     named = any(isinstance(found.effect, Payload) for found in account.outcome.found)
-    forces = sum(contact.added.effect.joint is None for contact in account.contacts)
     much = much_is_left(account.outcome.after.score).any()
-    return account.unlisted is not None or named or bool(much) or forces > 1
+    return account.unlisted is not None or named or bool(much) or bool(account.contacts)
 
 
 def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:

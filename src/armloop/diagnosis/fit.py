@@ -120,7 +120,7 @@ class Fit:
         for effect, free, spread in zip(self.effects, self.solution.free, spreads, strict=True):
             own = slice(len(free) - effect.nested)
             clearest = np.max(np.abs(free[own]) / np.sqrt(np.diag(spread)[own] + TINY), initial=0.0)
-            each.append(max(float(clearest), deviate(*_wald(free[own], spread[own, own]))))
+            each.append(max(float(clearest), deviate(*wald_statistic(free[own], spread[own, own]))))
         return tuple(each)
 
     @cached_property
@@ -129,7 +129,7 @@ class Fit:
 
         Where columns are alike each coefficient may be anything, though what they do together is plain.
         """
-        return tuple(_wald(*each) for each in zip(self.solution.free, self._spread, strict=True))
+        return tuple(wald_statistic(*each) for each in zip(self.solution.free, self._spread, strict=True))
 
     @cached_property
     def _spread(self) -> list[Array]:
@@ -168,7 +168,7 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
     return Fit(arm, tuple(effects), tuple(shapes), solution, np.array(outside), stacked)
 
 
-def _wald(x: Array, spread: Array) -> tuple[float, int]:
+def wald_statistic(x: Array, spread: Array) -> tuple[float, int]:
     """Wald's chi-square that coefficients (k,) of this covariance (k, k) are all zero, and its degrees of freedom.
 
     What the rows do not determine says nothing.

@@ -53,7 +53,11 @@ class CarriedLoad(Payload):
         self.intervals, self.error = tuple(intervals), error
 
     def columns(self, context: Context, shape: float) -> Array:
-        return super().columns(context, shape) * _during(context.motion, self.intervals)[:, None, None]
+        return super().columns(context, shape) * self.carried(context.motion)[:, None, None]
+
+    def carried(self, motion: Motion) -> Mask:
+        """(N,) samples in which it is carried."""
+        return _during(motion, self.intervals)
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         carried = _during(context.motion, _intervals(parameters, context.arm.n))
