@@ -15,6 +15,8 @@ from armloop.diagnosis import diagnose
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.identification.uncertainty.between_logs import between_logs, friction_spread, log_numbers, notes
 
+ONE = np.ones(1)
+
 
 def sines(logs: int, seconds: float = 40.0, rate: float = 25.0) -> Motion:
     """A joint that slides back and forth, at another speed in each log."""
@@ -38,25 +40,25 @@ def test_the_variance_between_logs_is_found_where_there_is_one(seed: int) -> Non
     blocks = np.arange(len(v)) // 50
     noise = 0.05 * rng.normal(size=len(v))
     rows = np.ones((len(v), 1), dtype=bool)
-    assert between_logs(noise[:, None], rows, motion, blocks) == [None]
+    assert between_logs(noise[:, None], rows, motion, blocks, ONE) == [None]
     level, slope = 0.3 * rng.normal(size=12), 0.1 * rng.normal(size=12)
     left = noise + (level - level.mean())[logs] * np.sign(v) + (slope - slope.mean())[logs] * v
-    (found,) = between_logs(left[:, None], rows, motion, blocks)
+    (found,) = between_logs(left[:, None], rows, motion, blocks, ONE)
     assert found is not None
     T = np.cov(np.stack([level, slope]))
     # what twelve logs hold, but for the noise of each: 0.05 N·m over some 20 blocks of 50 samples
     np.testing.assert_allclose(np.sqrt(np.diag(found)), np.sqrt(np.diag(T)), rtol=0.15)
-    assert between_logs(left[:, None], rows & (logs < 2)[:, None], motion, blocks) == [None]
+    assert between_logs(left[:, None], rows & (logs < 2)[:, None], motion, blocks, ONE) == [None]
 
 
-@pytest.mark.parametrize(("logs", "blocks"), [(8, 8), (20, 10), (4, 40)])
+@pytest.mark.parametrize(("logs", "blocks"), [(2, 8), (8, 4), (8, 8), (20, 10), (4, 40)])
 def test_logs_that_do_not_differ_are_rarely_said_to(logs: int, blocks: int) -> None:
     """Nominally one in a thousand: by chi-square, as if covariances of eight blocks were known, it was one in ten."""
     motion, rng = sines(logs, rate=20.0, seconds=2.0 * blocks), np.random.default_rng(logs)
     block = np.arange(len(motion.time)) // 40
     rows = np.ones((len(block), 1), dtype=bool)
     noise = rng.normal(size=(200, len(block), 1))
-    found = [between_logs(left, rows, motion, block) != [None] for left in noise]
+    found = [between_logs(left, rows, motion, block, ONE) != [None] for left in noise]
     assert sum(found) <= 6
 
 
@@ -67,7 +69,7 @@ def test_a_log_that_creeps_tells_no_slope() -> None:
     slow = (logs == 3)[:, None]
     v = np.where(slow, 0.002 * motion.v, motion.v)
     left = 0.01 * rng.normal(size=v.shape) + 10.0 * v * slow
-    assert between_logs(left, np.ones_like(slow), replace(motion, v=v), blocks) == [None]
+    assert between_logs(left, np.ones_like(slow), replace(motion, v=v), blocks, ONE) == [None]
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -80,11 +82,13 @@ def test_a_log_of_one_speed_tells_nothing_of_others(seed: int) -> None:
     v = np.where(sweep, np.sign(motion.v) * (0.5 + 0.08 * rng.normal(size=motion.v.shape)), motion.v)
     left = 0.01 * rng.normal(size=v.shape) - 0.5 * np.sign(v) * (np.abs(v) - 0.5) * sweep
     rows = np.ones_like(sweep)
-    assert between_logs(left, rows, replace(motion, v=v), blocks) == [None]
+    assert between_logs(left, rows, replace(motion, v=v), blocks, ONE) == [None]
     # over all speeds the same line is friction that differs
     elsewhere = left + (0.3 * np.sign(motion.v) - 0.2 * motion.v) * (logs == 1)[:, None]
-    (found,) = between_logs(elsewhere, rows, replace(motion, v=v), blocks)
-    assert found is not None and np.sqrt(found[0][0]) == pytest.approx(0.3 / np.sqrt(3), rel=0.1)
+    (found,) = between_logs(elsewhere, rows, replace(motion, v=v), blocks, ONE)
+    assert found is not None and np.sqrt(found[0][0]) == pytest.approx(
+        0.3 / np.sqrt(3) * np.sqrt(4 / 3), rel=0.1
+    )
 
 
 def worn(seed: int, dry: float, seconds: float = 40.0) -> MotionLog:
@@ -109,9 +113,12 @@ def models() -> tuple[Any, Any]:
 def test_a_model_says_of_which_joint_and_by_how_much(models: tuple[Any, Any]) -> None:
     differing, alike = models
     first, second, third = differing.uncertainty["between_logs"]
-    assert first is None and third is None
-    assert np.sqrt(second[0][0]) == pytest.approx(np.std([-0.4, -0.1, 0.15, 0.35], ddof=1), rel=0.3)
-    (line,) = notes(differing)
+    # of one more log, whose mean is known from four
+    assert np.sqrt(second[0][0]) == pytest.approx(
+        np.std([-0.4, -0.1, 0.15, 0.35], ddof=1) * np.sqrt(1.25), rel=0.3
+    )
+    assert max(first[0][0], third[0][0]) < 0.05 * second[0][0]
+    _, line, _ = notes(differing)
     assert line.startswith("joint 2: friction differs between the logs") and "N*m*s/rad (viscous)" in line
     assert line in differing.history["notes"]
     assert alike.uncertainty["between_logs"] == [None] * 3 and notes(alike) == []
@@ -141,7 +148,9 @@ def test_the_torque_of_one_standard_deviation_grows_with_friction(models: tuple[
     none = np.zeros_like(motion.q)
     samples = Samples(motion, none, none == 0, 0.01, 10.0, motion.time[[0, -1]][None])
     spread = friction_spread(differing, samples)
-    assert spread.shape == (*motion.q.shape, 2) and not spread[:, [0, 2]].any()
+    assert (
+        spread.shape == (*motion.q.shape, 2) and np.abs(spread[:, [0, 2]]).max() < 0.2 * np.abs(spread).max()
+    )
     # both errors are friction that grows, as it is where all drives cool down together
     assert (np.einsum("nk,n->k", spread[:, 1], motion.v[:, 1]) >= 0).all()
     assert not friction_spread(alike, samples).any()

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
 from armloop.identification.goodness.null import empirical_null
@@ -36,9 +38,12 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
     errors = standard_errors(model, samples, rows)
     if samples.cutoff_hz <= 0 or not errors.get("block_seconds"):
         return errors
+    motion, slides = samples.motion, sliding_rows(samples)
     left = residual(replace(model, effects=()), samples)
-    blocks = independent_blocks(samples.motion, errors["block_seconds"])
-    return {**errors, "between_logs": between_logs(left, sliding_rows(samples), samples.motion, blocks)}
+    blocks = independent_blocks(motion, errors["block_seconds"])
+    friction = model.friction.torque(motion, load=model.joint_load(motion)) * slides
+    level = np.sqrt((friction**2).sum(axis=0) / np.maximum(slides.sum(axis=0), 1))
+    return {**errors, "between_logs": between_logs(left, slides, motion, blocks, level)}
 
 
 def left_out_null(model: ReconstructedModel, data: Data, found: Found, shared: bool) -> list[dict[str, Any]]:

@@ -1,17 +1,22 @@
 """Random effects of a joint's friction: by how much its dry level and its viscous coefficient differ from log to log.
 
 A drive that warms up, another load of grease: within a log nothing shows it, and so no held-out block and no standard error
-does. Of what the model leaves, each log tells a level and a slope along its joint's direction, with the covariance of its
-own blocks; how far those lie apart beyond that is the variance between logs, by maximum likelihood (EM; Laird and Ware,
-Biometrics 38, 1982). Where logs do not differ by more than chance it is zero (the Welch-James test: covariances from few
-blocks are uncertain themselves; Johansen, Biometrika 67, 1980). A log that keeps to
-few speeds, as slow sweeps do, has no say: what a model gets wrong within them has a slope, too, and its line would be drawn
-out to speeds at which nobody saw it.
+does. Of what the model leaves, each log tells a level and a slope along its joint's direction; how far those lie apart, more
+than blocks of one log do, is the variance between logs, by maximum likelihood (EM; Laird and Ware, Biometrics 38, 1982).
+
+Few logs tell the variance of one joint poorly, but the drives of an arm are alike: as parts of each joint's friction all
+joints tell one variance together, and that of each is its posterior mean about it, how unlike joints are being chosen by the
+marginal likelihood (empirical Bayes; Efron and Morris, J. American Statistical Association 70, 1975). Where logs do not
+differ by more than chance it is zero (one-way analysis of variance, of all joints together).
+
+A log that keeps to few speeds, as slow sweeps do, has no say: what a model gets wrong within them has a slope, too, and its
+line would be drawn out to speeds at which nobody saw it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -20,19 +25,39 @@ from scipy.stats import f as f_distribution
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-from armloop.regression.clustered import clustered_covariance
 from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Where a run begins earlier than the one before it ended, or more than so many s later, another log does.
 _PAUSE = 60.0
-#: Fewest logs, and blocks with samples of a joint in each, that tell anything of the variance.
-_LOGS, _BLOCKS = 3, 8
+#: Fewest logs, and blocks with samples of a joint in each, that tell anything of the variance; and of all joints together
+#: so many logs beyond the first.
+_LOGS, _BLOCKS, _DIFFERENCES = 2, 3, 2
+#: How many times as much as that of all joints the variance of one may be: its logarithm is normal, of a mean of one time,
+#: with one of these standard deviations.
+_TIMES, _UNLIKE = np.exp(np.linspace(-12.0, 4.0, 161)), (0.0, 0.5, 1.0, 2.0, 4.0)
 #: So many times as far off, at most, a log's line may be over the speeds of all logs as it is over its own, by the errors
 #: of a least-squares line: one determined by few speeds says nothing of others.
 _FARTHER = 3.0
 #: Probability that logs which do not differ are taken to.
 _CHANCE = 0.001
 _ITERATIONS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """What each of G logs tells of a joint.
+
+    Attributes:
+        b: (G, 2) dry level and viscous coefficient, as parts of the joint's friction.
+        S: (G, 2, 2) their covariances by the blocks of all logs.
+        freedom: of these.
+        units: (2,) N·m (N) and N·m·s/rad (N·s/m) that are one part.
+    """
+
+    b: Array
+    S: Array
+    freedom: int
+    units: Array
 
 
 def log_numbers(motion: Motion) -> Index:
@@ -44,47 +69,109 @@ def log_numbers(motion: Motion) -> Index:
 
 
 def between_logs(
-    residual: Array, rows: Mask, motion: Motion, blocks: Index
+    residual: Array, rows: Mask, motion: Motion, blocks: Index, friction: Array
 ) -> list[list[list[float]] | None]:
-    """Per joint the (2, 2) covariance of dry level, N·m (N), and viscous coefficient, SI, between logs; None for none.
+    """Per joint the (2, 2) covariance of dry level, N·m (N), and viscous coefficient, SI, of one more log; None for none.
 
     Args:
         residual: (N, n) what the model leaves, N·m (N).
         rows: (N, n) samples in which a joint slides.
         blocks: (N,) block of each sample, longer than the residual remembers.
+        friction: (n,) the friction of each joint, RMS while it slides, N·m (N).
     """
     logs = log_numbers(motion)
-    return [
-        _variance(residual[mine, j], motion.v[mine, j], blocks[mine], logs[mine])
+    lines = [
+        _lines(residual[mine, j], motion.v[mine, j], blocks[mine], logs[mine], float(friction[j]))
         for j, mine in enumerate(rows.T)
     ]
+    told = [each for each in lines if each is not None]
+    if sum(len(each.b) - 1 for each in told) < _DIFFERENCES or _chance(told) > _CHANCE:
+        return [None] * len(lines)
+    every = _variance(told)
+    times = iter(_times(told, every))
+    return [None if each is None else _of_a_new_log(each, next(times) * every) for each in lines]
 
 
-def _variance(left: Array, v: Array, blocks: Index, logs: Index) -> list[list[float]] | None:
-    found, counts = [], []
+def _lines(left: Array, v: Array, blocks: Index, logs: Index, friction: float) -> _Lines | None:
+    """What each log tells of a joint; None of fewer than two, or where there is no friction to compare with."""
+    units = friction / np.array([1.0, max(float(np.sqrt(np.mean(v**2))) if len(v) else 0.0, TINY)])
+    found, inverses, counts, scores = [], [], [], []
     for log in np.unique(logs):
         own = logs == log
-        count = len(np.unique(blocks[own]))
-        if count >= _BLOCKS and _farther(v[own], v) <= _FARTHER:
-            X = np.column_stack([np.sign(v[own]), v[own]])
-            b = np.linalg.lstsq(X, left[own], rcond=None)[0]
-            counts.append(count)
-            found.append((b, clustered_covariance(X, left[own] - X @ b, blocks[own])))
-    if len(found) < _LOGS:
+        _, block = np.unique(blocks[own], return_inverse=True)
+        count = int(block.max()) + 1
+        if count < _BLOCKS or _farther(v[own], v) > _FARTHER:
+            continue
+        X = np.column_stack([np.sign(v[own]), v[own]]) * units
+        G = np.linalg.pinv(X.T @ X)
+        b = G @ X.T @ left[own]
+        rest = X * (left[own] - X @ b)[:, None]
+        # what a log's own line takes of the sums over its blocks
+        scores.append(
+            np.stack([np.bincount(block, weights=x) for x in rest.T], axis=1) * np.sqrt(count / (count - 2))
+        )
+        found.append(b)
+        inverses.append(G)
+        counts.append((count, len(left[own])))
+    if len(found) < _LOGS or friction <= 0:
         return None
-    b, S = (np.array(each) for each in zip(*found, strict=True))
-    d, precise = _apart(b, S)
-    if _chance(d, precise, counts) > _CHANCE:
-        return None
-    T = d.T @ d / len(b)
+    # noise is alike in all logs: each has too few blocks to tell its own
+    whole = np.concatenate(scores)
+    noise = whole.T @ whole / sum(n for _, n in counts)
+    S = [n * G @ noise @ G for G, (_, n) in zip(inverses, counts, strict=True)]
+    return _Lines(np.array(found), np.array(S), sum(count - 2 for count, _ in counts), units)
+
+
+def _chance(told: Sequence[_Lines]) -> float:
+    """Probability that logs which do not differ tell as different lines, by all joints together (analysis of variance)."""
+    apart = [(_apart(each.b, each.S), each) for each in told]
+    Q = sum(float(np.einsum("gi,gij,gj->", d, precise, d)) for (d, precise), _ in apart)
+    freedom, noise = (sum(x) for x in zip(*((2 * (len(e.b) - 1), e.freedom) for _, e in apart), strict=True))
+    return float(f_distribution.sf(Q / freedom, freedom, noise))
+
+
+def _variance(told: Sequence[_Lines]) -> Array:
+    """(2, 2) variance between logs that is likeliest of several joints together, as parts of their friction."""
+    T = np.mean([d.T @ d / len(d) for d, _ in (_apart(each.b, each.S) for each in told)], axis=0)
+    logs = sum(len(each.b) for each in told)
     for _ in range(_ITERATIONS):
-        d, precise = _apart(b, T + S)
-        gain = T @ precise
-        m = np.einsum("gij,gj->gi", gain, d)
-        T = np.mean(m[:, :, None] * m[:, None, :] + T - gain @ T, axis=0)
+        total = np.zeros((2, 2))
+        for each in told:
+            d, precise = _apart(each.b, T + each.S)
+            gain = T @ precise
+            m = np.einsum("gij,gj->gi", gain, d)
+            total += m.T @ m + np.sum(T - gain @ T, axis=0)
+        T = total / logs
     # the model was fitted to the logs themselves: their mean is theirs
-    T = 0.5 * (T + T.T) * len(b) / (len(b) - 1)
-    return [[float(x) for x in row] for row in T]
+    return np.asarray(0.5 * (T + T.T) * logs / (logs - len(told)))
+
+
+def _times(told: Sequence[_Lines], every: Array) -> Array:
+    """(J,) how many times the variance of all joints that of each is: its posterior mean."""
+    likely = np.array([[_log_likelihood(each, times * every) for times in _TIMES] for each in told])
+    likely = np.exp(likely - likely.max(axis=1, keepdims=True))
+    best, found = -np.inf, np.ones(len(told))
+    for unlike in _UNLIKE:
+        off = np.log(_TIMES) + 0.5 * unlike**2
+        prior = np.exp(-0.5 * (off / unlike) ** 2) if unlike else (np.abs(off) < 1e-9).astype(float)
+        weights = likely * prior / prior.sum()
+        evidence = float(np.log(np.maximum(weights.sum(axis=1), TINY)).sum())
+        if evidence > best:
+            best, found = evidence, weights @ _TIMES / np.maximum(weights.sum(axis=1), TINY)
+    return np.asarray(found)
+
+
+def _log_likelihood(own: _Lines, T: Array) -> float:
+    """Log likelihood of a joint's lines but for a constant, their mean being unknown (REML; Patterson and Thompson 1971)."""
+    d, precise = _apart(own.b, T + own.S)
+    sizes = np.linalg.slogdet(precise)[1].sum() - np.linalg.slogdet(precise.sum(axis=0))[1]
+    return 0.5 * float(sizes - np.einsum("gi,gij,gj->", d, precise, d))
+
+
+def _of_a_new_log(own: _Lines, T: Array) -> list[list[float]]:
+    """The variance of a joint in SI units, of a log beside the mean of those that were seen."""
+    of_one_more = T * (1 + 1 / len(own.b)) * np.outer(own.units, own.units)
+    return [[float(x) for x in row] for row in of_one_more]
 
 
 def _farther(own: Array, v: Array) -> float:
@@ -95,18 +182,6 @@ def _farther(own: Array, v: Array) -> float:
     mine, every = np.abs(own), np.abs(v)
     spread = np.mean((every - mine.mean()) ** 2) / max(float(mine.var()), TINY)
     return float(np.sqrt(0.5 * (1.0 + spread)))
-
-
-def _chance(d: Array, precise: Array, counts: Sequence[int]) -> float:
-    """Probability that estimates of the same lie so far apart, d (G, k), by precisions (G, k, k) from so many blocks."""
-    G, k = d.shape
-    own = np.eye(k) - np.linalg.pinv(precise.sum(axis=0)) @ precise
-    traces = np.trace(own @ own, axis1=1, axis2=2) + np.trace(own, axis1=1, axis2=2) ** 2
-    A = 0.5 * float(np.sum(traces / (np.array(counts) - 1.0)))
-    freedom = k * (G - 1)
-    scale = freedom + 2 * A - 6 * A / (freedom + 2)
-    Q = float(np.einsum("gi,gij,gj->", d, precise, d))
-    return float(f_distribution.sf(Q / scale, freedom, freedom * (freedom + 2) / (3 * A)))
 
 
 def _apart(b: Array, covariance: Array) -> tuple[Array, Array]:
