@@ -37,11 +37,20 @@ def test_a_drift_is_named_with_its_rate(
     (entry,) = found.to_dict()["effects"]
     for key, truth in (("rate", rate), ("offset", 0.05)):
         stated = entry["parameters"][key]
-        assert abs(stated["value"] - truth) < 4 * stated["std_error"] + 0.15 * abs(truth), key
+        assert abs(stated["value"] - truth) < 4 * stated["std_error"] < abs(truth), key
     assert entry["sensor"] and entry["when"] == "changed" and "warm up" in entry["remedy"]
     # a controller supplies nothing of it
     asked = [x[50] for x in (log.q, log.v, np.zeros_like(log.v))]
     np.testing.assert_array_equal(found.model.feedforward(*asked), model.feedforward(*asked))
+
+
+def test_a_drift_that_goes_on_is_a_straight_line_and_has_no_time_constant() -> None:
+    given = {"rate": Estimate(0.01, 1e-4, "N*m/s"), "offset": Estimate(0.1, 0.01, "N*m")}
+    drift = effect("torque_drift", 2)
+    words = drift.sentence({**given, "time_constant": Estimate(1e6, np.nan, "s")})
+    assert "in a straight line by 0.0100" in words and "time constant" not in words
+    words = drift.sentence({**given, "time_constant": Estimate(800.0, 40.0, "s")})
+    assert "at first by 0.0100" in words and "with a time constant of 800" in words
 
 
 def test_a_constant_and_a_short_log_hold_no_drift(model: ReconstructedModel) -> None:

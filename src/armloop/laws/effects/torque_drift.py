@@ -11,15 +11,15 @@ from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Value
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
 
-#: So many times the length of a run, a time constant is that of a straight line.
-_STRAIGHT = 20.0
+#: The time constant of a straight line, the shortest, s, and up to how many times the length of a run one is told from it.
+_STRAIGHT, _SHORTEST, _LONG = 1e6, 4.0, 20.0
 
 
 class TorqueDrift(Law):
     """recorded tau_j = true tau_j + b + r T (1 - exp(-t/T)), t from the start of the log, each log's own.
 
-    A fault of the sensor, which a controller must not supply. Of a drift that a run sees but the beginning of, T is long
-    and the drift a straight line of rate r.
+    A fault of the sensor, which a controller must not supply. Of a drift that goes on, which a run is too short to see
+    bend, it is a straight line of rate r, and T a million seconds.
     """
 
     name = "torque_drift"
@@ -47,7 +47,15 @@ class TorqueDrift(Law):
     def shapes(self, context: Context) -> Sequence[float]:
         length = float(np.max(context.motion.elapsed))
         # shorter than a few blocks it is no drift
-        return [] if length < 12.0 else [float(T) for T in np.geomspace(4.0, _STRAIGHT * length, 10)]
+        if length < 3 * _SHORTEST:
+            return []
+        return [*np.geomspace(_SHORTEST, _LONG * length, 10).tolist(), _STRAIGHT]
+
+    def refined(self, x: Array, shape: float) -> float:
+        better = super().refined(x, shape)
+        # longer, by more than the first order holds for: nothing tells how long
+        straight = better > shape and abs(x[1]) >= self._FARTHEST * abs(x[0])
+        return _STRAIGHT if straight or shape >= _STRAIGHT else better
 
     def resolved(self, parameters: dict[str, Estimate], tried: Sequence[float]) -> bool:
         # at the longest that is tried it is a straight line, and one of its own
@@ -62,10 +70,16 @@ class TorqueDrift(Law):
         return q, tau
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
+        rate, T = parameters["rate"].words(), parameters["time_constant"]
+        straight = number(T.value) >= _STRAIGHT
+        how = (
+            f"in a straight line by {rate}"
+            if straight
+            else f"at first by {rate}, with a time constant of {T.words(3)}"
+        )
         return (
-            f"the torque reading of joint {self.joint} drifts from {parameters['offset'].words()} at the start, at first by "
-            f"{parameters['rate'].words()}, with a time constant of {parameters['time_constant'].words(3)}: the sensor, not "
-            "the arm"
+            f"the torque reading of joint {self.joint} drifts from {parameters['offset'].words()} at the start, {how}: the "
+            "sensor, not the arm"
         )
 
     def remedy(self, parameters: dict[str, Estimate]) -> str:
