@@ -180,6 +180,33 @@ class TestLawThatIsNotListed:
         nothing: Any = SimpleNamespace(found=[], after=after)
         assert unlisted.find_law(evidence, nothing, lambda text: None) == (None, nothing)
 
+    @pytest.mark.parametrize(
+        ("terms", "masked", "stated"),
+        [
+            (["sign(v2)", "v2"], [1], False),
+            (["sign(v2)", "v2"], [0], True),  # of another joint
+            (["sign(v2)", "v2"], [], True),
+            (["sign(v2)", "v2^3"], [1], True),  # no sum of listed effects
+            ([], [1], True),  # real, whatever it is
+        ],
+    )
+    def test_a_sum_of_listed_effects_is_no_law_where_the_model_may_err_by_these(
+        self, terms: list[str], masked: list[int], stated: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        after = SimpleNamespace(score=Score.of(0, np.full(4, 9.0), np.array([0, 0, 1, 1]), np.zeros(4), 2))
+        effects = [SimpleNamespace(effect=SimpleNamespace(indices=(j,))) for j in masked]
+        outcome: Any = SimpleNamespace(found=[], after=after, masked=tuple(effects))
+        law = unlisted.Law([(1.0, name) for name in terms], np.ones(2), np.array([0, 1]))
+        monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: 1)
+        monkeypatch.setattr(unlisted, "without_effects_at", lambda evidence, outcome, joint: outcome)
+        monkeypatch.setattr(unlisted, "law_left", lambda evidence, fit, joint: law)
+        monkeypatch.setattr(unlisted, "_with_listed", lambda evidence, outcome, bare, law, j: (law, []))
+        monkeypatch.setattr(unlisted, "pruned", lambda evidence, outcome: "pruned")
+        monkeypatch.setattr(unlisted, "_stated", lambda evidence, outcome, law, j: (law, j))
+        evidence: Any = None
+        found = unlisted.find_law(evidence, outcome, lambda text: None)
+        assert found == ((law, 1) if stated else None, "pruned")
+
     def test_a_richer_library_for_fewer_joints(self) -> None:
         """Waves of so many times an angle in all, of so many joints at most, and products of two speeds."""
         chosen = [unlisted.library_of((True,) * n) for n in range(1, 9)]

@@ -128,7 +128,10 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
             return _in_place(evidence, outcome, bare, simpler, j)
         elif outcome.after.score.energy[j] > FORCED * bare.after.score.energy[j]:
             return find_law(evidence, bare, progress)
-    return _stated(evidence, outcome, law, j), pruned(evidence, outcome)
+    kept = pruned(evidence, outcome)
+    # what the model itself may err by is no law either, whatever listed effects it is a sum of
+    doubtful = bool(law.terms) and law.is_listed(j) and any(j in a.effect.indices for a in outcome.masked)
+    return (None if doubtful else _stated(evidence, outcome, law, j)), kept
 
 
 def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[Unlisted | None, Outcome]:
