@@ -36,6 +36,8 @@ class TestChoice:
 
         def trial(evidence: Any, residual: Any, weight: Any, burst: Any, kind: Any, shown: Any) -> Any:
             name = f"t{kind.effect.joint}" if kind.effect.joint else f"f{kind.link}"
+            if kind.point is not None:
+                name = f"p{kind.point[0]:g}"
             asked.append(name)
             weights.append(weight)
             if name not in shares:
@@ -54,7 +56,17 @@ class TestChoice:
             return found
 
         monkeypatch.setattr(pushes, "_somewhere", somewhere)
-        monkeypatch.setattr(pushes, "_off_the_links", lambda *_: ("beyond", shares.get("beyond", 0.0)))
+        monkeypatch.setattr(
+            pushes, "_off_the_links", lambda *_: ("beyond", np.ones(3), shares.get("beyond", 0.0))
+        )
+        self.alike: list[tuple[float, float]] | None = None
+
+        def at_a_point(evidence: Any, residual: Any, weight: Any, found: Any, kind: Any, alike: Any) -> Any:
+            assert kind.point.tolist() == [1, 1, 1]
+            self.alike = [(p.share, part) for p, part in alike]
+            return found
+
+        monkeypatch.setattr(pushes, "_at_a_point", at_a_point)
         X_tool = np.eye(4)
         X_tool[2, 3] = tool
         evidence: Any = SimpleNamespace(
@@ -66,10 +78,14 @@ class TestChoice:
         links = [f"f{link}" for link in range(joints - 1 if tool else joints, 2, -1)]
         if not tool and joints < 3:
             links = [f"f{joints}"]
-        first = [*(f"t{j + 1}" for j in shown), "f0", *links]
+        first = [*(f"t{j + 1}" for j in shown), "f0", *links, *(["p1"] if not tool and joints > 3 else [])]
         # where a force may act besides, only its error asks
-        forceful = found is not None and found.added.name[0] == "f"  # type: ignore[attr-defined]
-        assert asked == first + [f"f{k / 2}" for k in range(1, 2 * joints + 1) if forceful]
+        of = "" if found is None else found.added.name[0]  # type: ignore[attr-defined]
+        besides = {
+            "f": [f"f{k / 2}" for k in range(1, 2 * joints + 1)],
+            "p": ["p0.5", "p0.75", "p1.25", "p1.5"],
+        }
+        assert asked == first + besides.get(of, [])
         assert weights[0].tolist() == [[2.0, 0.25], [2.0, 0.0]]
         if found is None:
             return None
@@ -111,6 +127,18 @@ class TestChoice:
         )
         # where it explains no more than one at the last joint's place, that is named
         assert self.pushed(monkeypatch, {"f0": 0.86, "f4": 0.9}, 4, tool=0.0) == ("f0", [])
+
+    def test_where_no_tool_is_known_what_the_last_link_holds_may_have_been_pushed(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Where that explains surely more than a force on any link, or than a torque, which is unlikely anyway."""
+        assert self.pushed(monkeypatch, {"f0": 0.86, "p1": 0.9}, 4, tool=0.0) == ("f0", [])
+        assert self.alike is None
+        shares = {"f0": 0.84, "t1": 0.89, "p1": 0.9, "p0.5": 0.84, "p0.75": 0.86, "p1.25": 0.95}
+        assert self.pushed(monkeypatch, shares, 4, tool=0.0) == ("p1", [("external_torque", 1, 0.89)])
+        # it may have been nearer or farther away
+        assert self.alike == [(0.86, 0.75), (0.95, 1.25)]
+        assert self.pushed(monkeypatch, {"t1": 0.96, "p1": 0.9}, 4, tool=0.0) == ("t1", [])
 
     @pytest.mark.parametrize(
         ("shares", "joints", "handed_on"),

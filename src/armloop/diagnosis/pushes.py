@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
+from armloop.regression.moments import unit_length
 from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
@@ -26,8 +28,8 @@ PAUSE = 0.3
 SHORTEST = 0.1
 #: So many joints or fewer feel a force as if it were a torque on any of them.
 FEW = 3
-#: Points at which a force may have acted lie so many links apart.
-_STEP = 0.5
+#: Points at which a force may have acted lie so many links apart, or are so many times as far beyond the last one.
+_STEP, _NEARER = 0.5, (0.5, 0.75, 1.25, 1.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +107,11 @@ def push(
     # Where no tool is known, its place is an axis: the last joint feels only what pushes the last link elsewhere.
     last = () if evidence.model.arm.X_tool[:3, 3].any() else (n,)
     kinds += [_Kind(effect("external_contact", None), link) for link in (0, *last, *range(n - 1, 2, -1))]
+    # What pushes an arm is a force far more often than a torque on one joint; two or three joints cannot tell.
+    forceful = n > FEW
+    force, point, held = _off_the_links(evidence, residual, weight, burst) if forceful else (None, None, 0.0)
+    # ... or what the last link holds is pushed, of which nobody knows how long it is
+    kinds += [_Kind(effect("external_contact", None), 0, point)] if last and forceful else []
     tried = [
         (trial, kind)
         for kind in kinds
@@ -115,8 +122,6 @@ def push(
     tried = agreed if any(trial.own >= MOSTLY for trial, _ in agreed) else tried
     if not tried:
         return None
-    # What pushes an arm is a force far more often than a torque on one joint; two or three joints cannot tell.
-    forceful = n > FEW
     most, noticed = (max(getattr(trial, of) for trial, _ in tried) for of in ("share", "own"))
     # There a force is free to explain what joints that show nothing of it always leave: it is as good without.
     equals = [
@@ -125,10 +130,10 @@ def push(
         if trial.share >= most - FREEDOM or (not forceful and trial.own >= noticed - FREEDOM)
     ]
 
-    def order(pair: tuple[Contact, _Kind]) -> tuple[bool, int, bool, float]:
+    def order(pair: tuple[Contact, _Kind]) -> tuple[bool, bool, int, bool, float]:
         trial, kind = pair
         unlikely = forceful and kind.effect.joint is not None
-        return unlikely, kind.effect.complexity, bool(kind.link), -trial.share
+        return unlikely, kind.point is not None, kind.effect.complexity, bool(kind.link), -trial.share
 
     best, chosen = min(equals, key=order)
     if best.own < MOSTLY:
@@ -138,14 +143,18 @@ def push(
     best = replace(best, rivals=list(rivals.values()))
     if chosen.effect.joint is not None:
         return best
+    if chosen.point is not None:
+        nearer = [(replace(chosen, point=part * chosen.point), part) for part in _NEARER]
+        asked = [(_trial(evidence, residual, weight, burst, kind, shown), part) for kind, part in nearer]
+        alike = [(p, part) for p, part in asked if p and p.share >= best.share - FREEDOM]
+        return _at_a_point(evidence, residual, weight, best, chosen, alike)
     along = (_Kind(chosen.effect, link) for link in np.arange(_STEP, n + _STEP, _STEP).tolist())
     points = [_trial(evidence, residual, weight, burst, kind, shown) for kind in along]
     anywhere = [p for p in points if p and p.share >= most - FREEDOM and not p.contradicted]
     if not forceful:
         return _somewhere(best, anywhere)
-    force, share = _off_the_links(evidence, residual, weight, burst)
     # the joints beyond another link feel nothing of what pushes that
-    beyond = force if chosen.link in (0, n) or share > most + FREEDOM else None
+    beyond = force if chosen.link in (0, n) or held > most + FREEDOM else None
     return _somewhere(best, anywhere, beyond)
 
 
@@ -159,21 +168,73 @@ def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, 
     return trial if trial is not None and trial.own >= MOSTLY else None
 
 
-def _off_the_links(evidence: Evidence, residual: Array, weight: Array, burst: slice) -> tuple[Array, float]:
-    """The force (3,) on the point of the last link, or of what that holds, on which it explains most, and how much."""
-    arm = evidence.model.arm
-    kind = _Kind(effect("external_contact", None), 0)
-    still, *ends = (
-        _burst(evidence, residual, weight, burst, replace(kind, point=point))[1]
-        for point in (np.zeros(3), *np.eye(3))
-    )
-    # what the last link holds is hardly longer than any link
-    away = 0.5 * float(np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).max())
+def _off_the_links(
+    evidence: Evidence, residual: Array, weight: Array, burst: slice
+) -> tuple[Array, Array, float]:
+    """The force (3,) and the point (3,) of the last link, or of what that holds, which explain most, and how much."""
+    still, levers = _levers(evidence, residual, weight, burst)
     y = residual[burst] * weight[burst]
     seconds = (burst.stop - burst.start) * evidence.samples.period
-    count = arm.n * max(1, round(seconds / SHORTEST))
-    force, _, share = force_and_point(still, [end - still for end in ends], y, away, NOTICEABLE, count)
-    return force, share
+    count = evidence.model.arm.n * max(1, round(seconds / SHORTEST))
+    return force_and_point(still, levers, y, _away(evidence), NOTICEABLE, count)
+
+
+def _away(evidence: Evidence) -> float:
+    """How far from the last link's origin along an axis, m, it is usually pushed: as long as what it holds may be."""
+    return 0.5 * float(np.linalg.norm(evidence.model.arm.X_PF[:, :3, 3], axis=1).max())
+
+
+def _levers(evidence: Evidence, residual: Array, weight: Array, burst: slice) -> tuple[Array, list[Array]]:
+    """(N, n, 3) torque per unit of a force on the last link's origin, and what a metre along each of its axes adds."""
+    still, *ends = (
+        _burst(evidence, residual, weight, burst, _Kind(effect("external_contact", None), 0, at))[1]
+        for at in (np.zeros(3), *np.eye(3))
+    )
+    return still, [end - still for end in ends]
+
+
+def _at_a_point(
+    evidence: Evidence,
+    residual: Array,
+    weight: Array,
+    found: Contact,
+    kind: _Kind,
+    alike: Sequence[tuple[Contact, float]],
+) -> Contact:
+    """A force with the point that it acts on, and the standard errors of both, each holding the other's.
+
+    The prior of the point is one more independent observation.
+
+    Args:
+        alike: forces on points so many times as far off that explain the event as well: it may be any of them (law of
+            total variance).
+    """
+    motion, arm, given = evidence.samples.motion, evidence.model.arm, found.added.parameters
+    start, end = (number(given[key].value) for key in ("start", "end"))
+    first, last = np.flatnonzero(found.rows & (motion.time >= start) & (motion.time <= end))[[0, -1]]
+    burst = slice(int(first), int(last) + 1)
+    part, columns, y = _burst(evidence, residual, weight, burst, kind)
+    force = np.asarray(given["force"].value)
+    _, levers = _levers(evidence, residual, weight, burst)
+    X = np.concatenate([columns, np.stack([lever @ force for lever in levers], axis=2)], axis=2)
+    left, pieces = y - columns @ force, block_numbers(part, SHORTEST)
+    sums = np.array([np.einsum("njf,nj->f", X[pieces == k], left[pieces == k]) for k in np.unique(pieces)])
+    prior = np.diag(np.repeat([0.0, float((left**2).sum()) / len(sums) / _away(evidence) ** 2], 3))
+    G = X.reshape(-1, 6).T @ X.reshape(-1, 6) + prior
+    scale = unit_length(np.diag(G))
+    bread = np.linalg.pinv(G * np.outer(scale, scale), rcond=NOTICEABLE**2) * np.outer(scale, scale)
+    errors = np.sqrt(np.diag(bread @ (sums.T @ sums + prior) @ bread))
+    assert kind.point is not None
+    forces = np.array([force, *(each.added.parameters["force"].value for each, _ in alike)])
+    off = np.array([1.0, *(part for _, part in alike)])[:, None] * kind.point - kind.point
+    errors = np.hypot(errors, np.sqrt(np.mean(np.hstack([forces - force, off]) ** 2, axis=0)))
+    at = arm.X_tool[:3, :3].T @ (kind.point - arm.X_tool[:3, 3])
+    parameters = {
+        **given,
+        "force": replace(given["force"], std_error=errors[:3].tolist()),
+        "point": Estimate(at.tolist(), errors[3:].tolist(), "m"),
+    }
+    return replace(found, added=replace(found.added, parameters=parameters))
 
 
 def _somewhere(found: Contact, points: list[Contact], beyond: Array | None = None) -> Contact:

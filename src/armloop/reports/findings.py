@@ -53,14 +53,16 @@ def findings(diagnosis: Diagnosis) -> list[str]:
 def _events(diagnosis: Diagnosis) -> str:
     """What all events of a run were, in words."""
     forces = all(contact.added.effect.joint is None for contact in diagnosis.contacts)
-    links = any("link" in contact.added.parameters for contact in diagnosis.contacts)
+    links = any({"link", "point"} & set(contact.added.parameters) for contact in diagnosis.contacts)
     return "events" if not forces else "pushes on the arm" if links else "pushes at the tool"
 
 
 def _toolless(diagnosis: Diagnosis) -> bool:
     """Whether a force is said to act on the tool of an arm that has no such link: at its last joint, for want of it."""
     effects = [contact.added for contact in diagnosis.contacts]
-    on_tool = any(e.effect.name == "external_contact" and "link" not in e.parameters for e in effects)
+    on_tool = any(
+        e.effect.name == "external_contact" and not {"link", "point"} & set(e.parameters) for e in effects
+    )
     return on_tool and np.array_equal(diagnosis.model.arm.X_tool, np.eye(4))
 
 

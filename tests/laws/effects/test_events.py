@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic import three_axis
@@ -12,6 +14,7 @@ from armloop.laws.effects.base import Parameter
 from armloop.laws.effects.events import during
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import tool_jacobian
+from armloop.robot.newton_euler import joint_torques
 
 
 def context(seconds: int = 5) -> Context:
@@ -29,6 +32,32 @@ def test_a_torque_acts_on_its_joint_while_it_lasts() -> None:
     slide = effect("external_torque", 3).estimates(load_arm("scara"), np.ones(1), np.eye(1), 0.0)
     assert slide["torque"].unit == "N"
     assert torque.estimates(given.arm, np.ones(1), np.array([[-1e-20]]), 0.0)["torque"].std_error == 0.0
+
+
+def test_a_force_on_what_the_last_link_holds_acts_at_its_point() -> None:
+    """Of the frame of the tool, which may be turned; as the weight of a unit mass there whose gravity is the force."""
+    contact, given = effect("external_contact", None), context()
+    X_tool = np.eye(4)
+    X_tool[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    X_tool[:3, 3] = [0.1, 0.02, -0.03]
+    arm, point, force = replace(given.arm, X_tool=X_tool), np.array([0.2, 0.0, 0.05]), [1.0, -2.0, 3.0]
+    there = X_tool.copy()
+    there[:3, 3] = [0.1, 0.22, 0.02]
+    told = {"start": 1.0, "end": 2.0, "force": force, "point": point}
+    tau = contact.torque(replace(given, arm=arm), told)
+    jacobian = tool_jacobian(replace(arm, X_tool=there), given.motion.q)
+    np.testing.assert_allclose(tau[1:3], -np.einsum("njk,j->nk", jacobian[1:3], force), atol=1e-12)
+    weight = contact.body(arm, told, None)
+    still = np.zeros_like(given.motion.q)
+    held = joint_torques(
+        replace(arm, gravity=np.asarray(force)), weight.parameters, given.motion.q, still, still
+    )
+    np.testing.assert_allclose(held[1:3], tau[1:3], atol=1e-12)
+    stated = {key: Estimate(value, 0.0, "") for key, value in told.items()}
+    words = contact.sentence(stated)
+    assert words.startswith(
+        "something pushed what the last link holds, at (0.20, 0.00, 0.05) m in its frame, with 3.74 N"
+    )
 
 
 def test_a_force_on_a_link_acts_on_the_joints_before_it() -> None:

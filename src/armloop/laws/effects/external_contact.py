@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,10 @@ class ExternalContact(Effect):
     """tau -= J(q)^T F from ``start`` to ``end``, F the mean force in the base frame.
 
     The force acts on the tool, or, with a parameter ``link``, on the far end of that link (from 1): the joints beyond
-    feel nothing of it. The drives have to hold against it. It is an event of one run, not a property of the arm: no
-    controller supplies it. Its interval is found by :mod:`armloop.diagnosis.contacts`, before everything else.
+    feel nothing of it; or, with a parameter ``point``, there, m in the frame of the tool (of the last moving link if the
+    URDF has no tool), as on a gripper of which the URDF knows nothing. The drives have to hold against it. It is an event
+    of one run, not a property of the arm: no controller supplies it. Its interval is found by
+    :mod:`armloop.diagnosis.contacts`, before everything else.
     """
 
     name = "external_contact"
@@ -37,7 +40,8 @@ class ExternalContact(Effect):
         tau = np.zeros_like(context.motion.q)
         force = np.asarray(parameters["force"], dtype=float)
         link = int(number(parameters["link"])) if "link" in parameters else None
-        tau[rows] = -force @ tool_jacobian(context.arm, context.motion.q[rows], link)
+        arm = _pushed_at(context.arm, parameters["point"]) if "point" in parameters else context.arm
+        tau[rows] = -force @ tool_jacobian(arm, context.motion.q[rows], link)
         return tau
 
     def columns(self, context: Context, shape: float) -> Array:
@@ -49,7 +53,7 @@ class ExternalContact(Effect):
 
     def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
         """-J^T force while it lasts: the weight of a unit mass at the tool whose gravity is the force."""
-        mass = link_parameters(arm, {"mass": 1.0, "com": [0.0, 0.0, 0.0]})
+        mass = link_parameters(arm, {"mass": 1.0, "com": parameters.get("point", [0.0, 0.0, 0.0])})
         force = np.asarray(parameters["force"], dtype=float)
         return Body(np.concatenate([np.zeros(10 * (arm.n - 1)), mass]), force, weight_only=True)
 
@@ -62,7 +66,17 @@ class ExternalContact(Effect):
         size = float(np.linalg.norm(np.asarray(force.value)))
         at = ", ".join(f"{x:.1f}" for x in np.asarray(force.value))
         where = f"link {number(parameters['link'].value):.0f}" if "link" in parameters else "the tool"
+        if "point" in parameters:
+            point = ", ".join(f"{x:.2f}" for x in np.asarray(parameters["point"].value))
+            where = f"what the last link holds, at ({point}) m in its frame,"
         return (
             f"something pushed {where} with {size:.3g} N on average, ({at}) N in the base frame, from "
             f"{number(start.value):.2f} to {number(end.value):.2f} s"
         )
+
+
+def _pushed_at(arm: Arm, point: Value) -> Arm:
+    """The arm with its tool at a point (3,) of the tool's frame, m."""
+    X_tool = arm.X_tool.copy()
+    X_tool[:3, 3] += X_tool[:3, :3] @ np.asarray(point, dtype=float)
+    return replace(arm, X_tool=X_tool)
