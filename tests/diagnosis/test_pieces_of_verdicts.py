@@ -77,12 +77,25 @@ class TestWhereabouts:
 
 class TestReasons:
     def test_outside_the_trained_range(self) -> None:
-        assert reasons._range(0, 0.02, 0.0) == []
-        start = "joint 2: 3% of the run lies outside the range the model was trained on"
-        beyond = f"lies beyond {reasons.FAR:g} times the range and was not judged"
-        assert reasons._range(1, 0.03, 0.0) == [start]
-        assert reasons._range(1, 0.03, 0.009) == [f"{start}; less than 1% {beyond}"]
-        assert reasons._range(1, 0.03, 0.01) == [f"{start}; 1% {beyond}"]
+        def said(outside: list[float], far: list[float]) -> list[str]:
+            return reasons._outside(np.array(outside), np.array(far))
+
+        assert said([0.02, 0.0], [0.0, 0.0]) == []
+        start = "samples outside the range the model was trained on: "
+        far, judged = "beyond 1.2 times the range", "; what lies beyond 1.2 times the range was not judged"
+        assert said([0.02, 0.03], [0.0, 0.0]) == [f"{start}3% of joint 2's"]
+        assert said([0.0, 0.03], [0.0, 0.009]) == [f"{start}3% of joint 2's (less than 1% {far}){judged}"]
+        several = f"{start}3% of joint 1's, 40% of joint 2's (1% {far}), 50% of joint 3's (30%){judged}"
+        assert said([0.03, 0.4, 0.5], [0.0, 0.01, 0.3]) == [several]
+
+    def test_slower_than_in_training(self) -> None:
+        arm = SimpleNamespace(revolute=np.array([True, True, False]))
+        model: Any = SimpleNamespace(arm=arm, history={"slowest": [0.0471, 0.3, 0.02]})
+        assert reasons._slow(model, np.array([0.02, 0.0, 0.0])) == []
+        assert reasons._slow(model, np.array([0.03, 0.0, 0.25])) == [
+            "samples in which a joint slides slower than it was trained at, which were not judged: 3% of joint 1's "
+            "(0.047 rad/s), 25% of joint 3's (0.02 m/s)"
+        ]
 
     def test_a_residual_is_real_if_it_can_be_foretold_or_nothing_is_known_of_it(self) -> None:
         def real(
@@ -210,7 +223,7 @@ class TestReasons:
         assert self.standing(monkeypatch, [0.5, 9.0, 0.5], slides=19) == ([still], False)
         for far, unknown in ((40, False), (41, True)):
             words, found = self.standing(monkeypatch, [0.5, None, 0.5], far=far)
-            assert len(words) == 1 and words[0].startswith("joint 3: 8") and found is unknown
+            assert len(words) == 1 and "% of joint 3's (8" in words[0] and found is unknown
 
     def test_a_joint_of_which_next_to_nothing_counts_is_said_to_slide_where_it_does(
         self, monkeypatch: pytest.MonkeyPatch

@@ -40,7 +40,7 @@ def test_of_a_run_unlike_the_training_logs_it_is_not_claimed_that_the_arm_has_ch
 ) -> None:
     found = diagnose(model, [log_of(measured, "no1")], jobs=1)
     assert found.outcome.found == [] and found.unlisted is None and found.to_dict()["effects"] == []
-    assert any("lies outside the range" in reason for reason in found.reasons)
+    assert any("outside the range the model was trained on" in reason for reason in found.reasons)
 
 
 def test_in_a_run_like_them_nothing_has_changed(model: ReconstructedModel, measured: Path) -> None:

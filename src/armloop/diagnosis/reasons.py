@@ -29,7 +29,7 @@ from armloop.identification.goodness import (
 from armloop.identification.scoring import too_slow
 from armloop.laws.effects.events import ends
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import Mask
+from armloop.util.arrays import Array, Mask
 
 #: Fewest moving samples of a joint that has moved.
 _FEWEST = 20
@@ -70,11 +70,10 @@ def standing(
     far = strays.mean(axis=0)
     slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
     slides = sliding(samples, model)
-    reasons: list[str] = []
+    reasons = [*_outside(outside, far), *_slow(model, slow)]
     unknown, unexplained, judged = False, [], 0
     multiples: list[bool | None] = []
     for j, part in enumerate(parts):
-        reasons += _range(j, float(outside[j]), float(far[j])) + _slow(model, j, float(slow[j]))
         unknown |= bool(far[j] > NEARLY_ALL)
         if evidence.rows[:, j].sum() < _FEWEST:
             reasons.append(_uncounted(j, slides[:, j], strays[:, j], creeps[:, j]))
@@ -196,23 +195,31 @@ def _uncounted(j: int, slides: Mask, strays: Mask, creeps: Mask) -> str:
     return f"joint {j + 1} slides only {where}: nothing can be said of it"
 
 
-def _range(j: int, outside: float, far: float) -> list[str]:
-    if outside <= WORTH_A_WORD:
+def _outside(outside: Array, far: Array) -> list[str]:
+    """A sentence on the joints of whose samples parts (n,) lie outside the trained range, and far outside."""
+    said, beyond = [], f" beyond {FAR:g} times the range"
+    for j in np.flatnonzero(outside > WORTH_A_WORD):
+        words = f"{outside[j]:.0%} of joint {j + 1}'s"
+        if far[j] > 0:
+            words += f" ({'less than 1%' if far[j] < 0.01 else format(far[j], '.0%')}{beyond})"
+            beyond = ""
+        said.append(words)
+    if not said:
         return []
-    words = f"joint {j + 1}: {outside:.0%} of the run lies outside the range the model was trained on"
-    if far == 0:
-        return [words]
-    part = f"{far:.0%}" if far >= 0.01 else "less than 1%"
-    return [f"{words}; {part} lies beyond {FAR:g} times the range and was not judged"]
+    rest = "" if beyond else f"; what lies beyond {FAR:g} times the range was not judged"
+    return [f"samples outside the range the model was trained on: {', '.join(said)}{rest}"]
 
 
-def _slow(model: ReconstructedModel, j: int, part: float) -> list[str]:
-    if part <= WORTH_A_WORD:
+def _slow(model: ReconstructedModel, slow: Array) -> list[str]:
+    """A sentence on the joints that slide slower than in training in a part (n,) of the samples that they move in."""
+    said = [
+        f"{slow[j]:.0%} of joint {j + 1}'s ({model.history['slowest'][j]:.2g} {'rad/s' if model.arm.revolute[j] else 'm/s'})"
+        for j in np.flatnonzero(slow > WORTH_A_WORD)
+    ]
+    if not said:
         return []
-    speed, unit = model.history["slowest"][j], "rad/s" if model.arm.revolute[j] else "m/s"
     return [
-        f"joint {j + 1}: in {part:.0%} of the samples in which it moves it is slower than it was trained at ({speed:.2g} "
-        f"{unit}); they were not judged"
+        f"samples in which a joint slides slower than it was trained at, which were not judged: {', '.join(said)}"
     ]
 
 
