@@ -14,6 +14,7 @@ from armloop.diagnosis import reasons, unlisted, whereabouts
 from armloop.diagnosis.lasting import lasting, much_lasts
 from armloop.diagnosis.score import Score
 from armloop.identification.goodness import Parts
+from armloop.laws.effects import effect
 
 
 def motion(lengths: tuple[int, ...], joints: int = 1) -> Motion:
@@ -87,6 +88,23 @@ class TestReasons:
         assert said([0.0, 0.03], [0.0, 0.009]) == [f"{start}3% of joint 2's (less than 1% {far}){judged}"]
         several = f"{start}3% of joint 1's, 40% of joint 2's (1% {far}), 50% of joint 3's (30%){judged}"
         assert said([0.03, 0.4, 0.5], [0.0, 0.01, 0.3]) == [several]
+
+    @pytest.mark.parametrize(
+        ("logs", "said"), [(["a"], True), (["a", "b"], False), ([], False), (None, False)]
+    )
+    def test_friction_that_one_log_cannot_tell_from_what_differs_between_runs(
+        self, logs: list[str] | None, said: bool
+    ) -> None:
+        model: Any = SimpleNamespace(history={"logs": logs})
+        kinds = [("torque_gain", 1), ("coulomb_friction", 2), ("viscous_friction", 3), ("quadratic_drag", 3)]
+        found: Any = [
+            SimpleNamespace(effect=effect(*kind), always=kind[0] == "quadratic_drag") for kind in kinds
+        ]
+        words = reasons.of_one_log(model, found)
+        assert len(words) == said
+        if said:
+            assert "coulomb_friction at joint 2, viscous_friction at joint 3 may be" in words[0]
+        assert reasons.of_one_log(model, found[:1]) == []
 
     def test_slower_than_in_training(self) -> None:
         arm = SimpleNamespace(revolute=np.array([True, True, False]))

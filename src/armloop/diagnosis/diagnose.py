@@ -38,6 +38,7 @@ from armloop.diagnosis.reasons import (
     event_untold,
     in_doubt,
     masked,
+    of_one_log,
     standing,
     too_little,
     too_still,
@@ -396,5 +397,6 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             too_little(each.effect.label(), each.joints, each.share, each.small)
             for each in suspected(evidence, outcome.found, unsaid)
         ]
+    doubted += of_one_log(model, outcome.found)
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))

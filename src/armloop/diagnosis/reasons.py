@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from armloop.identification.goodness import (
     witness,
 )
 from armloop.identification.scoring import too_slow
+from armloop.laws.effects import Effect
 from armloop.laws.effects.events import ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Mask
@@ -141,6 +142,24 @@ def masked(added: AddedEffect) -> str:
         f"{added.effect.label()} would explain some of what is left there, but is no larger than what the model's own "
         "coefficients may be wrong by, friction that differs from log to log among them: it is not stated"
     )
+
+
+class _Named(Protocol):
+    @property
+    def effect(self) -> Effect: ...
+    @property
+    def always(self) -> bool: ...
+
+
+def of_one_log(model: ReconstructedModel, found: Sequence[_Named]) -> list[str]:
+    """A sentence on friction that is found by a model of a single log, which tells nothing of the variance between logs."""
+    rubbing = [f.effect.label() for f in found if f.effect.rubs and not f.always]
+    if not rubbing or len(model.history.get("logs") or ()) != 1:
+        return []
+    return [
+        "the model was made from one log, which does not tell by how much the friction of this arm differs from run to run, "
+        f"as where drives warm up: {', '.join(rubbing)} may be no more than that; a model of several logs knows"
+    ]
 
 
 def too_little(label: str, joints: Sequence[int], share: float, small: bool) -> str:
