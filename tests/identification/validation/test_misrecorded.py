@@ -133,6 +133,19 @@ def test_of_currents_no_unit_of_torque_is_guessed(model: ReconstructedModel) -> 
     assert said(currents, milli) == "all torques are about 1000 times what the model gives; give tau in A"
 
 
+def test_currents_that_are_said_to_be_torques_are_told_by_the_models_gains(model: ReconstructedModel) -> None:
+    """Of gains that differ: no factor is common to them."""
+    gains = [12.0, 3.0, 0.5]
+    geared = replace(model, recorded={"unit": "A", "drive_gains": gains})
+    log = run(1, 15.0)
+    assert said(geared, replace(log, tau=log.tau / gains)).startswith(
+        "tau seems to be motor current: times the"
+    )
+    assert said(geared, log) == ""
+    assert not said(geared, replace(log, tau=log.tau / [3.0, 12.0, 0.5])).startswith("tau seems to be")
+    assert not said(model, replace(log, tau=log.tau / gains)).startswith("tau seems to be")
+
+
 def test_joints_that_do_not_share_a_factor_have_none_in_common(model: ReconstructedModel) -> None:
     log = run(6, 12.0)
     assert said(model, replace(log, tau=log.tau * [5.0, 5.0, 9.0])) == ""

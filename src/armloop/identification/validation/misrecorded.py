@@ -53,6 +53,10 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
         return ""
     usual = _usual(model, samples)
     predicted = smooth(samples, model.predict(samples.motion))
+    if gains := model.recorded["drive_gains"]:
+        torques = replace(samples, tau=samples.tau * np.asarray(gains))
+        if _far_better(left, _relative(torques.tau - predicted, torques), _usual(model, torques)):
+            return "tau seems to be motor current: times the model's drive gains it is what the model gives; give it as A"
     gain = _common_gain(samples, predicted)
     if gain and _far_better(left, _relative(samples.tau - gain * predicted, samples), usual):
         return _factor(gain, "A" if model.in_amperes else "N·m (N)")
