@@ -16,7 +16,7 @@ from synthetic import measured, three_axis
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
-from armloop.diagnosis import Diagnosis, diagnose
+from armloop.diagnosis import Diagnosis, diagnose, load_direction
 from armloop.diagnosis import carried as carrying
 from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.carried import account_with_load, find_carried
@@ -28,6 +28,7 @@ from armloop.laws.effects import Context, effect, hypotheses
 from armloop.laws.effects.payload import Payload
 from armloop.model import ReconstructedModel
 from armloop.reports.findings import findings
+from armloop.robot.kinematics import tool_jacobian
 from armloop.util.progress import silent
 
 LOAD = {"mass": 0.4, "com": [0.03, -0.02, 0.05], "own_inertia": 0.0}
@@ -151,6 +152,31 @@ def test_a_weight_pulls_straight_down(model: ReconstructedModel, sideways: float
     tilted = replace(given.samples, tau=given.samples.tau + push_of(given.samples.motion, pushed))
     known = carrying.Known.of(replace(given, samples=tilted), [load], [carrying._shape(load)])
     assert pulls_down(known, there) is weight
+
+
+def test_what_is_not_known_to_be_a_push_may_be_a_weight(
+    model: ReconstructedModel, accounts: Accounts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A horizontal force must be real; it is asked of the load's centre; and what does not hang is no load."""
+    whole, account, _ = accounts
+    load, _ = find_carried(without(whole, [])) or (None, None)
+    assert load is not None
+    known = carrying.Known.of(without(whole, []), [load], [carrying._shape(load)])
+    there, asked = load.carried(whole.samples.motion), list[np.ndarray]()
+
+    def jacobian(arm: Any, q: np.ndarray) -> np.ndarray:
+        asked.append(arm.X_tool[:3, 3])
+        return tool_jacobian(arm, q)
+
+    monkeypatch.setattr(load_direction, "tool_jacobian", jacobian)
+    monkeypatch.setattr(load_direction, "_UPRIGHT", 0.0)
+    for errors, weight in ((2.9, True), (3.1, False)):
+        monkeypatch.setattr(load_direction, "deviate", lambda *_, errors=errors: errors)
+        assert pulls_down(known, there) is weight
+    X_tool = three_axis().X_tool
+    np.testing.assert_allclose(asked[0], X_tool[:3, :3] @ LOAD["com"] + X_tool[:3, 3], atol=0.01)
+    monkeypatch.setattr(carrying, "pulls_down", lambda *_: False)
+    assert account_with_load(whole, account, silent, 1) is None
 
 
 def test_the_augmented_model_knows_it_in_that_log_alone_and_no_controller_supplies_it(

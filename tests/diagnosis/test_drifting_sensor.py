@@ -7,14 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rubbing_arm import model_with_baseline, run
+from synthetic import three_axis
 
+from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import SIGNIFICANCE
 from armloop.diagnosis.trials import Known
-from armloop.laws.effects import Estimate, effect, hypotheses
+from armloop.laws.effects import Context, Estimate, effect, hypotheses
 from armloop.model import ReconstructedModel
 
 
@@ -51,6 +53,21 @@ def test_a_drift_that_goes_on_is_a_straight_line_and_has_no_time_constant() -> N
     assert "in a straight line by 0.0100" in words and "time constant" not in words
     words = drift.sentence({**given, "time_constant": Estimate(800.0, 40.0, "s")})
     assert "at first by 0.0100" in words and "with a time constant of 800" in words
+
+
+def test_a_time_constant_that_wants_to_be_longer_than_the_first_order_tells_is_that_of_a_straight_line() -> (
+    None
+):
+    drift = effect("torque_drift", 2)
+    assert drift.refined(np.array([1.0, 9.0, 0.0]), 100.0) == 1e6
+    assert 10.0 < drift.refined(np.array([1.0, -9.0, 0.0]), 100.0) < 90.0
+    assert drift.refined(np.array([1.0, 0.1, 0.0]), 100.0) == pytest.approx(100 * np.exp(0.1))
+    for further in (-9.0, -0.1, 0.1, 9.0):
+        assert drift.refined(np.array([1.0, further, 0.0]), 1e6) == 1e6
+    t = np.arange(0.0, 40.0, 0.1)
+    still = np.zeros((400, 3))
+    shapes = drift.shapes(Context(three_axis(), Motion(t, still, still, still, np.array([0]))))
+    assert shapes[0] == 4.0 and shapes[-2:] == pytest.approx([20 * 39.9, 1e6])
 
 
 def test_a_constant_and_a_short_log_hold_no_drift(model: ReconstructedModel) -> None:

@@ -85,6 +85,8 @@ class TestWhereAForceActs:
         rng = np.random.default_rng(seed)
         arm, away, held = six_joints(), np.eye(4), np.eye(4)
         away[:3, 3], held[0, 3] = rng.uniform(-0.25, 0.25, 3), 0.08 * tool
+        # a point is stated in the frame of the tool, which may be turned where it is not moved
+        held[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
         given = fourier_motion(6.0, 100.0, seed, arm)
         force = rng.normal(size=3) * 10.0
         rows = slice(250, 350)
@@ -107,7 +109,7 @@ class TestWhereAForceActs:
             assert (off > 0.5).any()
             return
         point = found.added.parameters["point"]
-        beside = np.abs(np.asarray(point.value) - away[:3, 3])
+        beside = np.abs(np.asarray(point.value) - held[:3, :3].T @ away[:3, 3])
         assert (beside < 3 * np.asarray(point.std_error)).all() and point.unit == "m"
         # along the force nothing but the motion tells of it
         assert beside.max() < 0.05
@@ -117,6 +119,39 @@ class TestWhereAForceActs:
         expected[rows] = residual[rows]
         left = found.added.torque(context) - expected
         assert (left**2).sum() < (1 - 0.99) * (expected**2).sum()
+
+    def test_along_a_force_nothing_tells_where_it_acts_but_how_long_things_usually_are(self) -> None:
+        """Of an arm that keeps its posture: half of its longest link is the standard deviation of the point there."""
+        arm, away, force = six_joints(), np.eye(4), np.array([0.0, 0.0, 9.0])
+        given = motion((200,), 6)
+        given.q[:] = [0.3, -0.7, 0.9, 0.4, 0.8, -0.2]
+        rng = np.random.default_rng(4)
+        evidence: Any = SimpleNamespace(
+            samples=SimpleNamespace(motion=given, period=0.01, reach=0.0),
+            scale=np.ones(6),
+            model=SimpleNamespace(arm=arm),
+        )
+        still, *levers = (
+            force @ tool_jacobian(replace(arm, X_tool=np.block([[np.eye(3), at], [0, 0, 0, 1]])), given.q)[0]
+            for at in (np.zeros((3, 1)), *np.eye(3)[:, :, None])
+        )
+        along = np.linalg.svd(np.array(levers).T - still[:, None])[2][-1]
+        away[:3, 3] = 0.1 * along + 0.05 * np.cross(along, [1.0, 0.0, 0.0])
+        residual = -force @ tool_jacobian(replace(arm, X_tool=away), given.q) + 0.01 * rng.normal(
+            size=(200, 6)
+        )
+        of = {"force": Estimate(force.tolist(), [0.1] * 3, "N")}
+        of |= {"start": Estimate(0.2, 0.1, "s"), "end": Estimate(1.8, 0.1, "s")}
+        nothing: Any = None
+        rows = np.ones(200, dtype=bool)
+        found = pushes.Contact(
+            AddedEffect(effect("external_contact", None), of), rows, nothing, nothing, 0.9, 0.9
+        )
+        kind = pushes._Kind(effect("external_contact", None), 0, away[:3, 3])
+        stated = pushes._at_a_point(evidence, residual, np.ones((200, 6)), found, kind, [])
+        error = np.asarray(stated.added.parameters["point"].std_error)
+        usual = 0.5 * np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).max()
+        np.testing.assert_allclose(error, usual * np.abs(along), atol=0.02 * usual)
 
     def test_a_force_on_the_tool_has_no_link(self) -> None:
         found = pushes._somewhere(self.at(0.0, 3.0), [self.at(4.5, 3.0)]).added.parameters

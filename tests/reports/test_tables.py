@@ -52,6 +52,7 @@ def test_eta_stands_beside_the_papers(loop: SimpleNamespace) -> None:
         (None, {}, 0.0, True),
         (None, {}, 0.1, False),
         (None, {"link": Estimate(2.0, 0.1, "1")}, 0.0, False),
+        (None, {"point": Estimate([0.0, 0.0, 0.2], [0.1, 0.1, 0.1], "m")}, 0.0, False),
         (1, {}, 0.0, False),
     ],
 )
@@ -71,7 +72,11 @@ def test_a_force_on_a_tool_that_the_urdf_lacks_is_said_to_be_at_the_last_joint(
     X_tool[2, 3] = tool
     contact = SimpleNamespace(added=AddedEffect(effect(name, joint), parameters), share=0.76)
     model = replace(clean.model, arm=replace(clean.model.arm, X_tool=X_tool))
-    text = " ".join(findings(replace(clean, contacts=[contact], model=model)))
+    pushed = replace(clean, contacts=[contact], model=model)
+    text = " ".join(findings(pushed))
+    assert findings_module._events(pushed) == (
+        "events" if joint else "pushes on the arm" if more else "pushes at the tool"
+    )
     assert ("no link named `tool`" in text) == said
     assert "76 % of the burst" in text
     # three joints cannot tell where it acted
@@ -102,6 +107,11 @@ def test_an_events_times_and_link_stand_with_their_errors() -> None:
     table = str(events_table(SimpleNamespace(contacts=[SimpleNamespace(added=added, share=0.9)])))
     for cell in ("1.23 ± 0.05", "2.50 ± 0.10", "link 3 ± 0.6", "90 %"):
         assert cell in table
+    del parameters["link"]
+    assert " tool " in str(events_table(SimpleNamespace(contacts=[SimpleNamespace(added=added, share=0.9)])))
+    parameters["point"] = Estimate([0.0, 0.0, 0.1], [0.1, 0.1, 0.1], "m")
+    table = str(events_table(SimpleNamespace(contacts=[SimpleNamespace(added=added, share=0.9)])))
+    assert "beyond the last link" in table
 
 
 def test_the_largest_residual_is_said_to_be_of_the_joints_that_were_judged(

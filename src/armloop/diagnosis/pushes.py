@@ -19,6 +19,7 @@ from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
+from armloop.regression.embedded import RIDGE
 from armloop.regression.moments import unit_length
 from armloop.util.arrays import TINY, Array, Index, Mask
 
@@ -219,11 +220,12 @@ def _at_a_point(
     X = np.concatenate([columns, np.stack([lever @ force for lever in levers], axis=2)], axis=2)
     left, pieces = y - columns @ force, block_numbers(part, SHORTEST)
     sums = np.array([np.einsum("njf,nj->f", X[pieces == k], left[pieces == k]) for k in np.unique(pieces)])
-    prior = np.diag(np.repeat([0.0, float((left**2).sum()) / len(sums) / _away(evidence) ** 2], 3))
+    noise = float((left**2).sum()) / len(sums)
+    prior = np.diag(np.repeat([0.0, noise / _away(evidence) ** 2], 3))
     G = X.reshape(-1, 6).T @ X.reshape(-1, 6) + prior
     scale = unit_length(np.diag(G))
-    bread = np.linalg.pinv(G * np.outer(scale, scale), rcond=NOTICEABLE**2) * np.outer(scale, scale)
-    errors = np.sqrt(np.diag(bread @ (sums.T @ sums + prior) @ bread))
+    bread = np.linalg.pinv(G * np.outer(scale, scale), rcond=RIDGE) * np.outer(scale, scale)
+    errors = np.sqrt(np.diag(bread @ (sums.T @ sums + noise * prior) @ bread))
     assert kind.point is not None
     forces = np.array([force, *(each.added.parameters["force"].value for each, _ in alike)])
     off = np.array([1.0, *(part for _, part in alike)])[:, None] * kind.point - kind.point

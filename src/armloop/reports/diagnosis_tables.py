@@ -59,13 +59,8 @@ def events_table(diagnosis: Diagnosis) -> Table:
         p, joint = contact.added.parameters, contact.added.effect.joint
         size = p["force"] if joint is None else p["torque"]
         value = np.atleast_1d(np.asarray(size.value, dtype=float))
-        where = (
-            f"link {_rounded(p['link'], 0, 1)}"
-            if "link" in p
-            else "beyond the last link"
-            if "point" in p
-            else "tool"
-        )
+        where = "beyond the last link" if "point" in p else "tool"
+        where = f"link {_rounded(p['link'], 0, 1)}" if "link" in p else where
         rows.append(
             [
                 k + 1,

@@ -12,7 +12,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import diagnose
-from armloop.identification.reconstruction import Options, reconstruct
+from armloop.identification.reconstruction import Options, fitted, reconstruct
 from armloop.identification.uncertainty.between_logs import between_logs, friction_spread, log_numbers, notes
 
 ONE = np.ones(1)
@@ -51,7 +51,7 @@ def test_the_variance_between_logs_is_found_where_there_is_one(seed: int) -> Non
     assert between_logs(left[:, None], rows & (logs < 2)[:, None], motion, blocks, ONE) == [None]
 
 
-@pytest.mark.parametrize(("logs", "blocks"), [(2, 8), (8, 4), (8, 8), (20, 10), (4, 40)])
+@pytest.mark.parametrize(("logs", "blocks"), [(2, 8), (12, 3), (8, 4), (8, 8), (20, 10), (4, 40)])
 def test_logs_that_do_not_differ_are_rarely_said_to(logs: int, blocks: int) -> None:
     """Nominally one in a thousand: by chi-square, as if covariances of eight blocks were known, it was one in ten."""
     motion, rng = sines(logs, rate=20.0, seconds=2.0 * blocks), np.random.default_rng(logs)
@@ -60,6 +60,49 @@ def test_logs_that_do_not_differ_are_rarely_said_to(logs: int, blocks: int) -> N
     noise = rng.normal(size=(200, len(block), 1))
     found = [between_logs(left, rows, motion, block, ONE) != [None] for left in noise]
     assert sum(found) <= 6
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_joints_tell_one_variance_together_as_parts_of_their_friction(seed: int) -> None:
+    """Of two logs of five blocks a joint tells next to nothing by itself; of one without friction there is no part."""
+    rng, motion = np.random.default_rng(seed), sines(2, seconds=10.0)
+    logs, J = log_numbers(motion), 12
+    blocks = np.arange(len(logs)) // 50
+    friction = np.geomspace(1.0, 30.0, J)
+    friction[3] = 0.0
+    v = np.repeat(motion.v, J, axis=1)
+    apart = 0.05 * rng.normal(size=(2, J))
+    left = friction * (0.002 * rng.normal(size=v.shape) + (apart - apart.mean(axis=0))[logs] * np.sign(v))
+    rows = np.ones_like(v, dtype=bool)
+    found = between_logs(left, rows, replace(motion, q=0 * v, v=v, vdot=0 * v), blocks, friction)
+    assert [k for k, T in enumerate(found) if T is None] == [3]
+    parts = np.array([np.sqrt(T[0][0]) / F for T, F in zip(found, friction, strict=True) if T is not None])
+    own = np.std(np.delete(apart, 3, axis=1), axis=0, ddof=1) * np.sqrt(1.5)
+    together = np.sqrt(np.mean(own**2))
+    # nearer to what all of them tell than to their own
+    assert (
+        np.std(np.log(parts)) < 0.5 * np.std(np.log(own)) and 0.5 * together < parts.mean() < 1.6 * together
+    )
+
+
+def test_the_friction_that_they_are_parts_of_is_that_of_a_joint_that_slides(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given: list[Any] = []
+
+    def asked(*of: Any) -> list[None]:
+        given.append(of)
+        return [None] * 3
+
+    monkeypatch.setattr(fitted, "between_logs", asked)
+    options = Options(parts=False)
+    logs = [replace(worn(k, 0.0, 20.0), name=f"day_{k}") for k in (1, 2)]
+    model = reconstruct(logs, three_axis(), library="rigid-body", options=options).model
+    _, rows, motion, _, friction = given[-1]
+    torque = model.friction.torque(motion, load=model.joint_load(motion))
+    expected = [np.sqrt(np.mean(torque[mine, j] ** 2)) for j, mine in enumerate(rows.T)]
+    np.testing.assert_allclose(friction, expected, rtol=1e-6)
+    assert (~rows).any(axis=0).all()
 
 
 def test_a_log_that_creeps_tells_no_slope() -> None:
