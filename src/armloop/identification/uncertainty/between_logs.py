@@ -106,9 +106,9 @@ def _lines(left: Array, v: Array, blocks: Index, logs: Index, friction: float) -
         G = np.linalg.pinv(X.T @ X)
         b = G @ X.T @ left[own]
         rest = X * (left[own] - X @ b)[:, None]
-        # what a log's own line takes of the sums over its blocks
+        # the sums over a log's blocks add to nothing: its own line was fitted to them
         scores.append(
-            np.stack([np.bincount(block, weights=x) for x in rest.T], axis=1) * np.sqrt(count / (count - 2))
+            np.stack([np.bincount(block, weights=x) for x in rest.T], axis=1) * np.sqrt(count / (count - 1))
         )
         found.append(b)
         inverses.append(G)
@@ -119,7 +119,7 @@ def _lines(left: Array, v: Array, blocks: Index, logs: Index, friction: float) -
     whole = np.concatenate(scores)
     noise = whole.T @ whole / sum(n for _, n in counts)
     S = [n * G @ noise @ G for G, (_, n) in zip(inverses, counts, strict=True)]
-    return _Lines(np.array(found), np.array(S), sum(count - 2 for count, _ in counts), units)
+    return _Lines(np.array(found), np.array(S), sum(count - 1 for count, _ in counts), units)
 
 
 def _chance(told: Sequence[_Lines]) -> float:
