@@ -50,10 +50,8 @@ def run(
 
 def push_of(motion: Motion, pushed: dict[str, Any]) -> np.ndarray:
     """(N, n) torque of a force on the centre of the load, in the base frame."""
-    arm = three_axis()
-    X_tool = arm.X_tool.copy()
-    X_tool[:3, 3] += X_tool[:3, :3] @ LOAD["com"]
-    return effect("external_contact", None).torque(Context(replace(arm, X_tool=X_tool), motion), pushed)
+    arm = three_axis().with_tool_at(LOAD["com"])
+    return effect("external_contact", None).torque(Context(arm, motion), pushed)
 
 
 @pytest.fixture(scope="module")

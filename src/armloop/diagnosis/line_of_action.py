@@ -11,7 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from armloop.util.arrays import TINY, Array
+from armloop.regression.embedded import RIDGE
+from armloop.regression.moments import unit_length
+from armloop.util.arrays import TINY, Array, Index
 
 
 def force_and_point(
@@ -61,3 +63,23 @@ def force_and_point(
     )
     share = 1 - float(np.sum(left(at) ** 2)) / max(float(torques @ torques), TINY)
     return V @ force_at(at)[1], at, share
+
+
+def force_and_point_errors(X: Array, left: Array, pieces: Index, away: float) -> Array:
+    """(6,) standard errors of force, N, and point, m, each holding the other's: sandwich over independent pieces.
+
+    The point's prior is one more observation, as independent: along what no torque tells it is the error.
+
+    Args:
+        X: (N, n, 6) what a unit of force, and a metre along each axis under the force, change of the torques, weighted.
+        left: (N, n) what they leave, weighted.
+        pieces: (N,) number of each sample's piece.
+        away: as of :func:`force_and_point`.
+    """
+    sums = np.array([np.einsum("njf,nj->f", X[pieces == k], left[pieces == k]) for k in np.unique(pieces)])
+    noise = float((left**2).sum()) / len(sums)
+    prior = np.diag(np.repeat([0.0, noise / away**2], 3))
+    G = X.reshape(-1, 6).T @ X.reshape(-1, 6) + prior
+    scale = unit_length(np.diag(G))
+    bread = np.linalg.pinv(G * np.outer(scale, scale), rcond=RIDGE) * np.outer(scale, scale)
+    return np.asarray(np.sqrt(np.diag(bread @ (sums.T @ sums + noise * prior) @ bread)))

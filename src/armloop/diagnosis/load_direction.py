@@ -5,8 +5,6 @@ Beside the load a constant horizontal force on its centre is regressed, from the
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from armloop.data.signals import smooth
@@ -36,11 +34,9 @@ def pulls_down(known: Known, carried: Mask) -> bool:
         evidence.samples.motion.q,
         float(np.linalg.norm(evidence.model.arm.gravity)),
     )
-    X_tool = arm.X_tool.copy()
-    X_tool[:3, 3] += X_tool[:3, :3] @ np.asarray(mass["com"].value)
     level = np.linalg.svd(arm.gravity[None] / max(g, TINY))[2][1:]
     torque = (
-        np.einsum("hx,nxj->njh", level, tool_jacobian(replace(arm, X_tool=X_tool), q))
+        np.einsum("hx,nxj->njh", level, tool_jacobian(arm.with_tool_at(mass["com"].value), q))
         * carried[:, None, None]
     )
     samples, _, joint = evidence.stacking

@@ -13,14 +13,12 @@ from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import REFINEMENTS
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, NOTICEABLE, enough, leaves_more
-from armloop.diagnosis.line_of_action import force_and_point
+from armloop.diagnosis.line_of_action import force_and_point, force_and_point_errors
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
-from armloop.regression.embedded import RIDGE
-from armloop.regression.moments import unit_length
 from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
@@ -202,9 +200,7 @@ def _at_a_point(
     kind: _Kind,
     alike: Sequence[tuple[Contact, float]],
 ) -> Contact:
-    """A force with the point that it acts on, and the standard errors of both, each holding the other's.
-
-    The prior of the point is one more independent observation.
+    """A force with the point that it acts on, and the standard errors of both.
 
     Args:
         alike: forces on points so many times as far off that explain the event as well: it may be any of them (law of
@@ -218,14 +214,8 @@ def _at_a_point(
     force = np.asarray(given["force"].value)
     _, levers = _levers(evidence, residual, weight, burst)
     X = np.concatenate([columns, np.stack([lever @ force for lever in levers], axis=2)], axis=2)
-    left, pieces = y - columns @ force, block_numbers(part, SHORTEST)
-    sums = np.array([np.einsum("njf,nj->f", X[pieces == k], left[pieces == k]) for k in np.unique(pieces)])
-    noise = float((left**2).sum()) / len(sums)
-    prior = np.diag(np.repeat([0.0, noise / _away(evidence) ** 2], 3))
-    G = X.reshape(-1, 6).T @ X.reshape(-1, 6) + prior
-    scale = unit_length(np.diag(G))
-    bread = np.linalg.pinv(G * np.outer(scale, scale), rcond=RIDGE) * np.outer(scale, scale)
-    errors = np.sqrt(np.diag(bread @ (sums.T @ sums + noise * prior) @ bread))
+    pieces = block_numbers(part, SHORTEST)
+    errors = force_and_point_errors(X, y - columns @ force, pieces, _away(evidence))
     assert kind.point is not None
     forces = np.array([force, *(each.added.parameters["force"].value for each, _ in alike)])
     off = np.array([1.0, *(part for _, part in alike)])[:, None] * kind.point - kind.point

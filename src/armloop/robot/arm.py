@@ -124,6 +124,12 @@ class Arm:
         """(n,) limits of the generalized forces, N·m (N); infinite where there is none."""
         return np.array([joint.effort for joint in self.joints])
 
+    def with_tool_at(self, point: Any) -> Arm:
+        """The arm with its tool moved to a point (3,) of the tool's frame, m."""
+        X_tool = self.X_tool.copy()
+        X_tool[:3, 3] += X_tool[:3, :3] @ np.asarray(point, dtype=float)
+        return replace(self, X_tool=X_tool)
+
     @property
     def joint_names(self) -> list[str]:
         """Name of each joint, base to tip."""

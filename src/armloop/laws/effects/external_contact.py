@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,7 +39,7 @@ class ExternalContact(Effect):
         tau = np.zeros_like(context.motion.q)
         force = np.asarray(parameters["force"], dtype=float)
         link = int(number(parameters["link"])) if "link" in parameters else None
-        arm = _pushed_at(context.arm, parameters["point"]) if "point" in parameters else context.arm
+        arm = context.arm.with_tool_at(parameters["point"]) if "point" in parameters else context.arm
         tau[rows] = -force @ tool_jacobian(arm, context.motion.q[rows], link)
         return tau
 
@@ -73,10 +72,3 @@ class ExternalContact(Effect):
             f"something pushed {where} with {size:.3g} N on average, ({at}) N in the base frame, from "
             f"{number(start.value):.2f} to {number(end.value):.2f} s"
         )
-
-
-def _pushed_at(arm: Arm, point: Value) -> Arm:
-    """The arm with its tool at a point (3,) of the tool's frame, m."""
-    X_tool = arm.X_tool.copy()
-    X_tool[:3, 3] += X_tool[:3, :3] @ np.asarray(point, dtype=float)
-    return replace(arm, X_tool=X_tool)
