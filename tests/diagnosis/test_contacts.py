@@ -154,7 +154,11 @@ class TestFinding:
         monkeypatch.setattr(contacts, "known_contacts", lambda evidence: np.arange(100) < of.get("known", 0))
         monkeypatch.setattr(contacts, "_bursts", lambda *_: next(following))
         monkeypatch.setattr(
-            contacts, "_comes_back", lambda evidence, rows, level, b: b.rows.start in of.get("back", ())
+            contacts, "comes_back", lambda motion, rows, level, b: b.rows.start in of.get("back", ())
+        )
+        monkeypatch.setattr(contacts, "averaged", lambda samples, of: of)
+        monkeypatch.setattr(
+            contacts, "rubs", lambda motion, rows, mean, b: b.rows.start in of.get("rubs", ())
         )
         monkeypatch.setattr(
             contacts, "_sticks", lambda evidence, b, held: b.rows.start in of.get("sticks", ())
@@ -190,12 +194,14 @@ class TestFinding:
         monkeypatch.setattr(contacts, "pulses", pulses)
         monkeypatch.setattr(contacts, "beside", lambda samples, residual, rows: residual + rows.start)
         rows = np.full((100, 2), False) | of.get("judged", True)
-        evidence: Any = SimpleNamespace(
+        own = SimpleNamespace(
             samples=SimpleNamespace(motion=given, moving=None),
             rows=rows,
             model=SimpleNamespace(arm=three_axis(), history={}),
             scale=np.ones(2),
         )
+        # what differs from log to log does not come and go within one
+        evidence: Any = SimpleNamespace(within_a_log=lambda: own, samples=own.samples)
         monkeypatch.setattr(
             contacts, "_strays", lambda far, b: far.shape == (100, 2) and b.rows.start in of.get("strays", ())
         )
@@ -314,6 +320,7 @@ class TestFinding:
         bursts = [(20, 30, 0), (40, 50, 0), (60, 70, 0)]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, back=[20])] == [40, 60]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, sticks=[60])] == [20, 40]
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, rubs=[60])] == [20, 40]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, strays=[40])] == [20, 60]
 
     def test_what_differs_from_before_and_after_is_explained_less_what_is_there(
@@ -325,6 +332,7 @@ class TestFinding:
         assert self.left == [0.0, 34.0, 60.0, 80.0]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned, back=[60])] == [20, 34, 80]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned, sticks=[80])] == [20, 34, 60]
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned, rubs=[80])] == [20, 34, 60]
 
     def test_one_of_several_that_stand_out_is_near_enough(self, monkeypatch: pytest.MonkeyPatch) -> None:
         bursts, scanned = [(20, 30, 0), (70, 75, 0)], [(32, 36, 1), (50, 54, 1)]

@@ -72,7 +72,13 @@ def test_like_places_at_like_speeds_are_a_cell_of_a_joint_and_a_standstill_is_on
 
 def test_a_models_own_errors_are_weighted_like_the_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     errors = np.arange(24.0).reshape(4, 2, 3)
-    monkeypatch.setattr(evidence, "torque_errors", lambda model, samples: errors)
+    asked: list[bool] = []
+
+    def torque_errors(model: Any, samples: Any, between_logs: bool) -> np.ndarray:
+        asked.append(between_logs)
+        return errors * (1 if between_logs else 2)
+
+    monkeypatch.setattr(evidence, "torque_errors", torque_errors)
     rows = np.array([[True, False], [False, False], [True, True], [False, True]])
     own = SimpleNamespace(
         _of_motion=evidence._Columns(),
@@ -83,11 +89,16 @@ def test_a_models_own_errors_are_weighted_like_the_rows(monkeypatch: pytest.Monk
         stacking=(np.array([0, 2, 2, 3]), np.array([0, 1, 1, 2]), np.array([0, 0, 1, 1])),
         _places=np.array([0, 2, 3]),
         scale=np.array([0.5, 4.0]),
+        between=np.array([0.0, 1.0]),
     )
     expected = [errors[0, 0] / 0.5, errors[2, 0] / 0.5, errors[2, 1] / 4, errors[3, 1] / 4]
     for _ in range(2):  # the second time what is kept
         own.errors = Evidence.errors.fget(own)  # type: ignore[attr-defined]
         np.testing.assert_array_equal(Evidence._model_errors.func(own), expected)  # type: ignore[attr-defined]
+    # within a log friction does not differ: these errors are others, and kept beside them
+    own.between = np.zeros(2)
+    np.testing.assert_array_equal(Evidence.errors.fget(own), 2 * errors)  # type: ignore[attr-defined]
+    assert asked == [True, False]
 
 
 def test_columns_between_the_nodes_of_a_mesh_are_interpolated(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,6 +139,7 @@ def test_a_mesh_is_as_fine_as_what_ripples(known: bool) -> None:
     )
     bare = Evidence.of(model if known else model.with_effects([ripple]), samples, [])
     given, offset = bare.knowing([ripple]) if known else bare, EncoderOffset(2)
+    assert given.context.ripples == {2: (90.0,)}
     for shape in (0.0137, -0.055):
         exact = smooth(samples, offset.columns(given.context, shape))[given.independent]
         np.testing.assert_allclose(given.smoothed(offset, shape), exact, atol=1e-3 * np.abs(exact).max())

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from armloop.data.motion import Motion
-from armloop.diagnosis import contacts
 from armloop.diagnosis.contacts import Burst
+from armloop.diagnosis.recurrence import comes_back, rubs
 
 
 class TestSamePassage:
@@ -28,7 +28,7 @@ class TestSamePassage:
         level[30:33, 1] = 8.0, 10.0, 8.0
         level[:, 0], level[at, 0], level[at, 1] = 99.0, 0.0, high
         evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given))
-        return contacts._comes_back(evidence, np.arange(60), level, Burst(slice(30, 33), frozenset({1})))
+        return comes_back(evidence.samples.motion, np.arange(60), level, Burst(slice(30, 33), frozenset({1})))
 
     def test_it_is_within_a_twentieth_of_half_of_all_joints_ranges(self) -> None:
         assert self.comes_back(10)
@@ -55,7 +55,7 @@ class TestSamePassage:
         level[10:12] = [[1.0, 0.0], [highest, 1.0]]
         evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given))
         burst = Burst(slice(30, 32), frozenset({0, 1}))
-        assert contacts._comes_back(evidence, np.arange(60), level, burst) == back
+        assert comes_back(evidence.samples.motion, np.arange(60), level, burst) == back
 
 
 class TestPassages:
@@ -74,7 +74,7 @@ class TestPassages:
             level[k] = 9.0
         moved = Motion(0.1 * np.arange(N), q, 0 * q, 0 * q, np.array([0]))
         evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=moved))
-        return contacts._comes_back(evidence, np.arange(N), level, Burst(rows, frozenset({0})))
+        return comes_back(evidence.samples.motion, np.arange(N), level, Burst(rows, frozenset({0})))
 
     def test_most_of_them_decide(self) -> None:
         assert not self.again({})
@@ -100,6 +100,62 @@ class TestPassages:
         moved = Motion(0.1 * np.arange(N), q, 0 * q, 0 * q, np.array([0]))
         evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=moved))
         burst = Burst(slice(5, 7), frozenset({0, 1}))
-        assert not contacts._comes_back(evidence, np.arange(N), level, burst)
+        assert not comes_back(evidence.samples.motion, np.arange(N), level, burst)
         q[12, 0] = 0.0
-        assert contacts._comes_back(evidence, np.arange(N), level, burst)
+        assert comes_back(evidence.samples.motion, np.arange(N), level, burst)
+
+
+class TestThereAndBack:
+    """A joint that is as fast as 2 rad/s in samples 20 to 29, and again, back, in 60 to 69; beside one that is always."""
+
+    def rubs(self, back: dict[int, float], speed: float = 2.0, joints: tuple[int, ...] = (1,)) -> bool:
+        v, mean = np.full((100, 2), 2.0), np.zeros((100, 2))
+        v[:, 1] = 1.0
+        v[20:30, 1], mean[20:30, 1], mean[24, 1] = 1.98, -4.0, -5.0
+        for start, left in back.items():
+            v[start : start + 10, 1], mean[start : start + 10, 1] = np.sign(left) * -speed, left
+        moved = Motion(0.1 * np.arange(200), *np.zeros((3, 200, 2)), np.array([0]))
+        rows = np.arange(0, 200, 2)
+        moved.v[rows] = v
+        return rubs(moved, rows, mean, Burst(slice(40, 60), frozenset(joints)))
+
+    def test_friction_is_left_along_the_way_both_times(self) -> None:
+        assert self.rubs({60: 3.0}) and not self.rubs({60: 2.4})  # more than half of the peak
+        assert not self.rubs({}) and not self.rubs({60: 3.0}, joints=(0, 1))
+
+    def test_what_is_no_function_of_the_speed_is_a_push(self) -> None:
+        """As one that sets the joint going each time, and is not there while it slows down."""
+        t = np.arange(200)
+        v = np.full((200, 1), 0.1)
+        v[20:80, 0], v[120:180, 0] = (x * np.sin(np.pi * np.arange(60) / 60) for x in (2.0, -2.0))
+        moved = Motion(0.1 * t, v, v, v, np.array([0]))
+        drag, setting_out = 4 * v, 4 * np.sign(v) * (t % 100 < 52)[:, None] * (np.abs(v) > 0.2)
+        burst = Burst(slice(35, 65), frozenset({0}))
+        assert rubs(moved, t, drag, burst)
+        assert not rubs(moved, t, setting_out, burst)
+
+    def test_what_is_left_the_other_way_is_none(self) -> None:
+        """A torque of one sign that helps once and hinders once."""
+        v, mean = np.full((100, 1), 1.0), np.zeros((100, 1))
+        v[20:30], v[60:70] = 2.0, -2.0
+        mean[20:30] = mean[60:70] = -4.0
+        moved = Motion(0.1 * np.arange(100), v, v, v, np.array([0]))
+        assert not rubs(moved, np.arange(100), mean, Burst(slice(20, 30), frozenset({0})))
+        mean[60:70] = 4.0
+        assert rubs(moved, np.arange(100), mean, Burst(slice(20, 30), frozenset({0})))
+
+    def test_at_like_speeds(self) -> None:
+        """Within a twentieth of the fastest."""
+        assert self.rubs({60: 3.0}, speed=1.89) and not self.rubs({60: 3.0}, speed=1.87)
+
+    def test_most_times(self) -> None:
+        assert self.rubs({45: 0.1, 60: 3.0, 80: 3.0}) and not self.rubs({45: 0.1, 60: 3.0})
+
+    def test_its_own_surroundings_are_none(self) -> None:
+        assert not self.rubs({11: 3.0})
+        assert not rubs(
+            Motion(np.arange(4.0), *np.zeros((3, 4, 1)), np.array([0])),
+            np.array([0, 3]),
+            np.zeros((2, 1)),
+            Burst(slice(1, 3), frozenset({0})),
+        )

@@ -106,9 +106,10 @@ class TestSlowerThanTrained:
         (498.0, 2, 9.0, False),
         # surely, or not
         (500.0, 2, 2.9, False),
-        # with fewer parameters it need but be likelier: its two terms cost 2 log 100, the effect 8
-        (411.0, 3, 0.0, True),
-        (408.0, 3, 0.0, False),
+        # with fewer parameters it need but be likelier: its two terms cost 2 log (2 50), that there is one log 3, the
+        # effect 8
+        (533.0, 3, 0.0, False),
+        (537.0, 3, 0.0, True),
         # with more it is not simpler
         (900.0, 1, 9.0, False),
     ],
@@ -127,7 +128,8 @@ def test_a_law_leaves_far_less_beyond_the_baseline(
     monkeypatch.setattr(unlisted, "lead", lambda worse, better: lead)
     monkeypatch.setattr(unlisted, "log_prior", lambda evidence, effects: -8.0 * len(effects))
     monkeypatch.setattr(unlisted, "library_of", lambda revolute: None)
-    monkeypatch.setattr(unlisted, "names_of", lambda library, j: [""] * 100)
+    monkeypatch.setattr(unlisted, "names_of", lambda library, j: ["q1"] * 50 + ["q2"] * 50)
+    monkeypatch.setattr(unlisted, "hypotheses", lambda arm: [None] * 3)
     arm = SimpleNamespace(revolute=np.array([True]))
     evidence: Any = SimpleNamespace(variation=np.array([1.0]), model=SimpleNamespace(arm=arm))
     found = unlisted.Law([(1.0, "v1"), (2.0, "q1")], np.full(rows, np.sqrt(law / rows)), block)

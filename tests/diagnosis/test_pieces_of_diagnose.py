@@ -98,7 +98,7 @@ class Answers:
             "without_law": lambda evidence, law: evidence,
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
-        parts["of_one_log"] = lambda model, found: self.given.get("of_one_log", [])
+        parts["of_too_few_logs"] = lambda model, found: self.given.get("of_too_few_logs", [])
         parts["suspected"] = lambda evidence, found, left: self.note(
             "suspected", (evidence.name, found, left), self.given.get("suspected", [])
         )
@@ -261,7 +261,9 @@ def test_of_a_joint_of_which_something_hidden_is_told_nothing_else_is_suspected(
 ) -> None:
     hidden = SimpleNamespace(effect=effect("viscous_friction", joint + 1))
     law = Suspected(effect("coulomb_friction", 2), (1,), 0.8, small=bool(asked))
-    answers = Answers(monkeypatch, masked=(hidden,), suspected=[law], of_one_log=["a model of one log"])
+    answers = Answers(
+        monkeypatch, masked=((hidden, hidden),), suspected=[law], of_too_few_logs=["a model of one log"]
+    )
     reasons = judged(jobs=2).reasons
     assert "a model of one log" in reasons
     assert answers.asked["suspected"] == ("account", [], asked)

@@ -11,6 +11,7 @@ from stretches import circling, motion, steps
 from armloop.data.motion import Motion
 from armloop.diagnosis import contacts, pushes
 from armloop.diagnosis.contacts import Burst
+from armloop.diagnosis.recurrence import comes_back
 
 
 class TestBurstsOfNovelty:
@@ -147,7 +148,7 @@ class TestJoints:
 
         def back(*heights: float) -> bool:
             level = steps(N, *((k * 100 + 20, k * 100 + 30, h) for k, h in enumerate(heights)))[:, None]
-            return contacts._comes_back(evidence, np.arange(N), level, burst)
+            return comes_back(evidence.samples.motion, np.arange(N), level, burst)
 
         assert back(6.0, 10.0, 6.0, 0.0)
         assert not back(6.0, 10.0, 4.0, 0.0)
@@ -156,8 +157,8 @@ class TestJoints:
         level = steps(300, (20, 30, 9.0), (120, 130, 9.0))[:, None]
         part = Motion(given.time[:300], given.q[:300], given.v[:300], given.vdot[:300], np.array([0]))
         short: Any = SimpleNamespace(samples=SimpleNamespace(motion=part))
-        assert not contacts._comes_back(short, np.arange(300), level, burst)
-        assert not contacts._comes_back(evidence, np.arange(0, N, 50), np.ones((8, 1)), burst)
+        assert not comes_back(short.samples.motion, np.arange(300), level, burst)
+        assert not comes_back(evidence.samples.motion, np.arange(0, N, 50), np.ones((8, 1)), burst)
 
 
 class TestWhatIsNotJudged:

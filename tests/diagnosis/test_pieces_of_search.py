@@ -24,7 +24,7 @@ ANY_ARM: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
 class Named(str):
     """An effect that is no more than its name, which ends in the number of its parameters."""
 
-    other_joint = None
+    joint = other_joint = None
 
     @property
     def place(self) -> tuple[str, None, None]:
@@ -247,7 +247,7 @@ class TestSearch:
             monkeypatch.setattr(searching, "clear", clear)
             outcome = search.outcome()
             assert [f.effect for f in outcome.found] == named
-            assert [hidden.name for hidden in outcome.masked] == ["viscous1"] * (z > 3)
+            assert [hidden.name for _, hidden in outcome.masked] == ["viscous1"] * (z > 3)
 
     def test_of_what_is_hidden_at_a_joint_the_likeliest_is_told(
         self, monkeypatch: pytest.MonkeyPatch
@@ -256,7 +256,7 @@ class TestSearch:
         left = {"": 1000.0, "drag1": 150.0, "viscous1": 100.0}
         search = self.search(monkeypatch, left, viscous1=3.1, drag1=3.1)
         monkeypatch.setattr(searching, "clear", lambda evidence, outcome: replace(outcome, found=[]))
-        assert [hidden.name for hidden in search.outcome().masked] == ["viscous1"]
+        assert [hidden.name for _, hidden in search.outcome().masked] == ["viscous1"]
 
     def test_what_was_not_worth_it_beside_another_is_asked_again_without_that(
         self, monkeypatch: pytest.MonkeyPatch

@@ -32,7 +32,7 @@ class TestLawThatIsNotListed:
                 SimpleNamespace(effect=SimpleNamespace(complexity=c, label=lambda c=c: f"effect {c}"))
                 for c in found
             ]
-            return SimpleNamespace(found=effects, after=fit)
+            return SimpleNamespace(found=effects, after=fit, hidden=[])
 
         with_effects, without = outcome([1, 2], left), outcome([], bare)
         block = np.array([0, 0, 1, 1])
@@ -90,18 +90,24 @@ class TestLawThatIsNotListed:
         bare: Any = SimpleNamespace(found=[])
         monkeypatch.setattr(unlisted, "lead", lambda worse, better: 0.0)
 
-        def simpler(energy: float, terms: int, form: str = "v2^3") -> bool:
+        def simpler(energy: float, terms: int, form: str) -> bool:
             law = unlisted.Law([(1.0, form)] * terms, np.full(rows, np.sqrt(energy / rows)), block)
             return unlisted._is_simpler(evidence, law, with_effects, bare, 1)
 
-        functions = len(unlisted.names_of(unlisted.library_of((True, True, True)), 1))
-        for terms in (1, 2):
-            # against two effects of three parameters, each one of many; ten half blocks tell of a joint
-            needed = terms * np.log(functions) - 2 * np.log(len(hypotheses(arm))) - LOG_ODDS
+        names = unlisted.names_of(unlisted.library_of((True, True, True)), 1)
+        own = [name for name in names if not any(other in name for other in ("q1", "v1", "q3", "v3"))]
+        for terms, form, functions in (
+            (1, "v2^3", len(own)),
+            (2, "v2^3", len(own)),
+            (1, "v1*v2", len(names) - len(own)),
+        ):
+            # against two effects of three parameters, each one of many, as that there is a law is; its functions are those
+            # of the joint's own motion, or the many others; ten half blocks tell of a joint
+            needed = terms * np.log(2 * functions) - np.log(len(hypotheses(arm))) - LOG_ODDS
             same = (left + rows) / np.exp(needed / 10) - rows
-            assert simpler(same - 1, terms) and not simpler(same + 1, terms)
-        assert not simpler(0.0, 3)  # not fewer
-        assert simpler(0.0, 1) and not simpler(0.0, 1, "sign(v2)")  # dry friction is listed
+            assert simpler(same - 1, terms, form) and not simpler(same + 1, terms, form)
+        assert not simpler(0.0, 3, "v2^3")  # not fewer
+        assert simpler(0.0, 1, "v2^3") and not simpler(0.0, 1, "sign(v2)")  # dry friction is listed
 
     def test_what_was_named_at_a_joint_is_asked_even_if_it_leaves_what_the_baseline_does(
         self, monkeypatch: pytest.MonkeyPatch
@@ -123,7 +129,7 @@ class TestLawThatIsNotListed:
             def outcome(found: list[Any], energy: float, complexity: int) -> Any:
                 held_out = np.repeat([1.0, np.sqrt(energy / 100)], 100)
                 fit = SimpleNamespace(score=Score.of(complexity, held_out, joint, block, 2))
-                return SimpleNamespace(found=found, after=fit)
+                return SimpleNamespace(found=found, after=fit, hidden=[])
 
             with_effects, bare = outcome(found, left, 3), outcome(kept, 900.0, 1)
 
@@ -177,7 +183,7 @@ class TestLawThatIsNotListed:
         evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=SimpleNamespace(joints=2)))
         monkeypatch.setattr(unlisted, "without_effects_at", lambda evidence, outcome, joint: outcome)
         after = SimpleNamespace(score=SimpleNamespace(rows=np.zeros(2)))
-        nothing: Any = SimpleNamespace(found=[], after=after)
+        nothing: Any = SimpleNamespace(found=[], after=after, hidden=[])
         assert unlisted.find_law(evidence, nothing, lambda text: None) == (None, nothing)
 
     @pytest.mark.parametrize(
@@ -194,8 +200,8 @@ class TestLawThatIsNotListed:
         self, terms: list[str], masked: list[int], stated: bool, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         after = SimpleNamespace(score=Score.of(0, np.full(4, 9.0), np.array([0, 0, 1, 1]), np.zeros(4), 2))
-        effects = [SimpleNamespace(effect=SimpleNamespace(indices=(j,))) for j in masked]
-        outcome: Any = SimpleNamespace(found=[], after=after, masked=tuple(effects))
+        effects = [(SimpleNamespace(effect=SimpleNamespace(indices=(j,))), None) for j in masked]
+        outcome: Any = SimpleNamespace(found=[], after=after, masked=tuple(effects), hidden=[])
         law = unlisted.Law([(1.0, name) for name in terms], np.ones(2), np.array([0, 1]))
         monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: 1)
         monkeypatch.setattr(unlisted, "without_effects_at", lambda evidence, outcome, joint: outcome)
@@ -206,6 +212,16 @@ class TestLawThatIsNotListed:
         evidence: Any = None
         found = unlisted.find_law(evidence, outcome, lambda text: None)
         assert found == ((law, 1) if stated else None, "pruned")
+
+    def test_what_the_model_may_err_by_is_not_left_over(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        outcome: Any = SimpleNamespace(hidden=["viscous"])
+        monkeypatch.setattr(unlisted, "with_effects", lambda evidence, outcome, more: (outcome, more))
+        asked: list[Any] = []
+        monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: asked.append(outcome))
+        monkeypatch.setattr(unlisted, "_one_instead", lambda evidence, outcome, progress: (None, outcome))
+        evidence: Any = None
+        assert unlisted.find_law(evidence, outcome, lambda text: None) == (None, outcome)
+        assert asked == [(outcome, ["viscous"])]
 
     def test_a_richer_library_for_fewer_joints(self) -> None:
         """Waves of so many times an angle in all, of so many joints at most, and products of two speeds."""

@@ -90,21 +90,36 @@ class TestReasons:
         assert said([0.03, 0.4, 0.5], [0.0, 0.01, 0.3]) == [several]
 
     @pytest.mark.parametrize(
-        ("logs", "said"), [(["a"], True), (["a", "b"], False), ([], False), (None, False)]
+        ("labels", "which"),
+        [
+            (["a"], "a would explain some of what is left there, but is no larger"),
+            (["a", "b"], "a and b would explain some of what is left there, but are no larger"),
+            (["a", "b", "c"], "a, b and c would explain some of what is left there, but are no larger"),
+        ],
+    )
+    def test_what_the_model_may_err_by_is_told_in_one_sentence(self, labels: list[str], which: str) -> None:
+        (said,) = reasons.masked(labels)
+        assert said.startswith(which) and reasons.masked([]) == []
+        assert said.endswith("it is not stated" if len(labels) == 1 else "they are not stated")
+
+    @pytest.mark.parametrize(
+        ("kept", "said"),
+        [({"between_logs_known": "assumed"}, True), ({"between_logs_known": "alike"}, False), ({}, False)],
     )
     def test_friction_that_one_log_cannot_tell_from_what_differs_between_runs(
-        self, logs: list[str] | None, said: bool
+        self, kept: dict[str, str], said: bool
     ) -> None:
-        model: Any = SimpleNamespace(history={"logs": logs})
+        model: Any = SimpleNamespace(uncertainty=kept)
         kinds = [("torque_gain", 1), ("coulomb_friction", 2), ("viscous_friction", 3), ("quadratic_drag", 3)]
         found: Any = [
             SimpleNamespace(effect=effect(*kind), always=kind[0] == "quadratic_drag") for kind in kinds
         ]
-        words = reasons.of_one_log(model, found)
+        words = reasons.of_too_few_logs(model, found)
         assert len(words) == said
         if said:
-            assert "coulomb_friction at joint 2, viscous_friction at joint 3 may be" in words[0]
-        assert reasons.of_one_log(model, found[:1]) == []
+            assert "0.5% (dry) and 1.1% (viscous) of it" in words[0]
+            assert "and coulomb_friction at joint 2, viscous_friction at joint 3 may be no more" in words[0]
+        assert reasons.of_too_few_logs(model, found[:1]) == []
 
     def test_slower_than_in_training(self) -> None:
         arm = SimpleNamespace(revolute=np.array([True, True, False]))
@@ -122,7 +137,7 @@ class TestReasons:
             words, real = reasons._multiple(Parts(1, 0.5, left, noise, error, None, apart), 0, 2.5)
             assert words.startswith("joint 1: the residual is 2.5 times the baseline")
             assert ("something is there" in words) == (left is None or error is None or noise is None)
-            assert ("nor a law that was found accounts for it" in words) == (
+            assert ("nor a law that is stated accounts for it" in words) == (
                 real is True and "something" not in words
             )
             assert ("predicts little of it" in words) == (real is False)

@@ -109,7 +109,7 @@ def run(options: Reconstruct) -> None:
     recorded = recorded_as(options, TORQUE)
     most = 0 if options.scheduler else IN_MEMORY
     logs = log_sources(options.logs, arm.n, recorded, most)
-    if options.jobs is not None and sum(log.samples for log in logs) <= most:
+    if (options.jobs or 1) > 1 and sum(log.samples for log in logs) <= most:
         warn(f"--jobs is not used: logs of up to {most:,} samples are kept in memory and regressed at once")
     workers = Cluster(options.scheduler) if options.scheduler else Processes(options.jobs)
     try:

@@ -15,11 +15,12 @@ from armloop.data.motion import Motion
 from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside, near_standstill
-from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innovations
+from armloop.diagnosis.innovations import at_rest, averaged, deviations, dry_level, innovations
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, MULTIPLE, SIGNIFICANCE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import FEW, PAUSE, SHORTEST, Contact, around, push, torque_on
+from armloop.diagnosis.recurrence import comes_back, rubs, within
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect
 from armloop.util.arrays import TINY, Array, Index, Mask
@@ -28,8 +29,6 @@ from armloop.util.arrays import TINY, Array, Index, Mask
 _RISE = 4.2
 #: It lasts while the novelty is above this part of its peak.
 _EDGE = 0.25
-#: Positions and speeds of all joints that differ by less than this part of their ranges are the same passage.
-_SAME = 0.05
 #: Events fill at most this part of a joint's motion: what is there longer is none.
 _LONGEST = 0.4
 
@@ -72,7 +71,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
     Returns:
         Events in order of time; none where the residual is what it is in like motion, or is unlike it too long.
     """
-    motion = evidence.samples.motion
+    evidence, motion = evidence.within_a_log(), evidence.samples.motion
     known = known_contacts(evidence)
     if evidence.rows.any():
         tells, bursts = _unlike(evidence, residual, found, known)
@@ -218,11 +217,12 @@ def _unlike(
     far = far_outside(motion, evidence.model.history.get("range"))
     rows, new = novelty(evidence, innovation, rest)
     new = np.where(known[rows][:, None], 0.0, new)
-    level = np.abs(new)
+    level, mean = np.abs(new), averaged(evidence.samples, innovation)[rows]
     bursts = [
         burst
         for burst in _together([_bursts(motion, rows, of_joint) for of_joint in new.T])
-        if not _comes_back(evidence, rows, level, burst)
+        if not comes_back(motion, rows, level, burst)
+        and not rubs(motion, rows, mean, burst)
         and not _sticks(evidence, burst, held)
         and not _strays(far, burst)
     ]
@@ -231,7 +231,8 @@ def _unlike(
         burst = Burst(pulse.rows, frozenset({pulse.joint}), beside=True)
         if (
             not any(_meet(motion, burst, other) for other in bursts)
-            and not _comes_back(evidence, rows, pulse.level[rows], burst)
+            and not comes_back(motion, rows, pulse.level[rows], burst)
+            and not rubs(motion, rows, mean, burst)
             and not _sticks(evidence, burst, held)
         ):
             bursts.append(burst)
@@ -328,32 +329,6 @@ def _on_two_joints(one: Contact, other: Contact) -> bool:
     """Whether two torques account for one burst, each on a joint of its own."""
     joints = {one.added.effect.joint, other.added.effect.joint}
     return one.shown == other.shown and len(joints) == 2 and None not in joints
-
-
-def _comes_back(evidence: Evidence, rows: Index, level: Array, burst: Burst) -> bool:
-    """Whether a burst is there most times that the arm passes the same posture at the same speed: then it is none."""
-    motion = evidence.samples.motion
-    q, v = motion.q[rows], motion.v[rows]
-    joints = sorted(burst.joints)
-    inside = within(rows, burst.rows)
-    length = inside.stop - inside.start
-    if length == 0:
-        return False
-    peak = inside.start + int(np.argmax(level[inside, joints].max(axis=1)))
-    size = [np.maximum(np.ptp(x, axis=0) / 2, 1e-9) for x in (q, v)]
-    off = np.maximum(np.abs((q - q[peak]) / size[0]).max(axis=1), np.abs((v - v[peak]) / size[1]).max(axis=1))
-    same = off < _SAME
-    same[max(inside.start - length, 0) : inside.stop - 1 + length] = False
-    times = np.flatnonzero(same)
-    passages: list[Index] = np.split(times, np.flatnonzero(np.diff(times) > 1) + 1) if len(times) else []
-    high = MOSTLY * float(level[peak, joints].max())
-    there = [float(level[passage][:, joints].max()) > high for passage in passages]
-    return len(there) > 0 and 2 * sum(there) > len(there)
-
-
-def within(rows: Index, stretch: slice) -> slice:
-    """Which of some samples (M,), in order, lie in a stretch."""
-    return slice(*np.searchsorted(rows, [stretch.start, stretch.stop]).tolist())
 
 
 def _meet(motion: Motion, one: Burst, other: Burst) -> bool:

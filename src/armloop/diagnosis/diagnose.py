@@ -38,7 +38,7 @@ from armloop.diagnosis.reasons import (
     event_untold,
     in_doubt,
     masked,
-    of_one_log,
+    of_too_few_logs,
     standing,
     too_little,
     too_still,
@@ -390,13 +390,15 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             break
         doubted += [event_in_doubt(each.added) for each in drowning]
         contacts = [each for each in contacts if each not in drowning]
-    doubted += [masked(each) for each in outcome.masked if _is_left(each.effect, outcome, stand.left)]
+    doubted += masked(
+        [f.effect.label() for f, _ in outcome.masked if _is_left(f.effect, outcome, stand.left)]
+    )
     if unlisted is None and turned is None:
-        unsaid = sorted(set(stand.left) - {j for each in outcome.masked for j in each.effect.indices})
+        unsaid = sorted(set(stand.left) - {j for f, _ in outcome.masked for j in f.effect.indices})
         doubted += [
             too_little(each.effect.label(), each.joints, each.share, each.small)
             for each in suspected(evidence, outcome.found, unsaid)
         ]
-    doubted += of_one_log(model, outcome.found)
+    doubted += of_too_few_logs(model, outcome.found)
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))

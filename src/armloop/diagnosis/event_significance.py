@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.diagnosis.contacts import within
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import MULTIPLE
 from armloop.diagnosis.pushes import Contact
+from armloop.diagnosis.recurrence import within
 from armloop.laws.effects import Effect
 from armloop.laws.effects.events import ends
 from armloop.model import ReconstructedModel

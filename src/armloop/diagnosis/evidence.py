@@ -82,6 +82,7 @@ class Evidence:
         asked: effects that may be asked about.
         unknown: (N, n) samples of which a joint's torque says nothing, not even that friction may hold it.
         known: effects that the columns of a model are those of, beside its own.
+        between: (n,) the part of ``scale`` by which friction differs from log to log.
     """
 
     model: ReconstructedModel
@@ -94,6 +95,7 @@ class Evidence:
     asked: tuple[Effect, ...] = ()
     unknown: Mask | None = None
     known: tuple[AddedEffect, ...] = ()
+    between: Array = field(default_factory=lambda: np.zeros(1))
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
     _tried: dict[Place, tuple[float, ...]] = field(default_factory=dict, repr=False)
@@ -107,8 +109,8 @@ class Evidence:
         own = 0.01 * np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-9
         scale = np.where(np.isfinite(scale), np.maximum(scale, 1e-3 * own), own)
         # what no run of its own shows: friction that differs between the training logs
-        between = (friction_spread(model, samples) ** 2).sum(axis=2)
-        scale = np.hypot(scale, np.sqrt(np.mean(between, axis=0)))
+        between = np.sqrt(np.mean((friction_spread(model, samples) ** 2).sum(axis=2), axis=0))
+        scale = np.hypot(scale, between)
         worst = np.array([float(x or 0.0) for x in model.baseline.get("worst", [])] or [0.0])
         variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
         blocks = block_numbers(samples.motion, _block_seconds(samples.motion, shortest_block(model)))
@@ -117,7 +119,9 @@ class Evidence:
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples)
         rows &= ~samples.at_an_end[:, None]
         asked, unknown = tuple(effects), samples.unknown
-        return Evidence(model, samples, scale, variation, rows, blocks, context, asked, unknown)
+        return Evidence(
+            model, samples, scale, variation, rows, blocks, context, asked, unknown, between=between
+        )
 
     def knowing(self, known: list[AddedEffect]) -> Evidence:
         """The same run with columns as a model sees them that has ``known`` effects."""
@@ -126,6 +130,11 @@ class Evidence:
         context = model.context(self.samples.motion, every)
         context = replace(context, period=self.context.period)
         return replace(self, context=context, known=tuple(known), _of_model=_Columns(), _tried={})
+
+    def within_a_log(self) -> Evidence:
+        """The same run for what comes and goes in it: its friction is that of one log all the while."""
+        scale = np.sqrt(np.maximum(self.scale**2 - self.between**2, 0.0))
+        return replace(self, scale=scale, between=np.zeros_like(self.between))
 
     def tried(self, effect: Effect) -> tuple[float, ...]:
         """Values of an effect's nonlinear parameter to try."""
@@ -202,10 +211,11 @@ class Evidence:
     @property
     def errors(self) -> Array:
         """(M, n, r) torque of the model's own errors at :attr:`independent` samples, one standard deviation each."""
+        differs = bool(self.between.any())
         return self._of_motion.of(
-            (("the model's own errors", None, None), None),
+            ((f"the model's own errors, between logs: {differs}", None, None), None),
             0.0,
-            lambda: torque_errors(self.model, self.samples)[self.independent],
+            lambda: torque_errors(self.model, self.samples, differs)[self.independent],
         )
 
     def smoothed(self, effect: Effect, shape: float) -> Array:

@@ -20,10 +20,10 @@ from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import enough, gain, is_worth
-from armloop.diagnosis.law_selection import library_of, names_of
 from armloop.diagnosis.outcomes import Found
 from armloop.diagnosis.search import ALTERNATIVE, MOST_EFFECTS, ROUNDS, told
 from armloop.diagnosis.trials import Known
+from armloop.diagnosis.unlisted import law_log_prior
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.found import RANGE
 from armloop.laws.effects.onset import Onset
@@ -190,9 +190,8 @@ def _posterior(account: Account, residual: Array, rows: Mask) -> float:
     effects = [*account.outcome.after.effects, *(contact.added.effect for contact in account.contacts)]
     value = told(account.everywhere(residual, rows)) + price(evidence, effects)
     if account.unlisted is not None:
-        terms = len(account.unlisted.parameters.keys() - set(RANGE))
-        library = library_of(tuple(evidence.model.arm.revolute.tolist()))
-        value -= terms * float(np.log(len(names_of(library, account.unlisted.joint - 1))))
+        terms = account.unlisted.parameters.keys() - set(RANGE)
+        value += law_log_prior(evidence, terms, account.unlisted.joint - 1)
     return value
 
 

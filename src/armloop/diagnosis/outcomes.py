@@ -60,17 +60,24 @@ class Outcome:
     """What the search found: accepted effects, and the fits without and with them.
 
     Attributes:
-        masked: effects that are plain in the run, but no larger than what the model itself may err by.
+        masked: effects that are plain in the run, but no larger than what the model itself may err by, and with what
+            parameters.
     """
 
     found: list[Found]
     before: Fit
     after: Fit
-    masked: tuple[AddedEffect, ...] = ()
+    masked: tuple[tuple[Found, AddedEffect], ...] = ()
 
     def added(self) -> list[AddedEffect]:
         """The effects with their parameters, ready to be composed with the model."""
         return self.after.added()
+
+    @property
+    def hidden(self) -> list[Found]:
+        """What is masked, and was not found."""
+        there = {f.effect.place for f in self.found}
+        return [f for f, _ in self.masked if f.effect.place not in there]
 
 
 def known_with(evidence: Evidence, found: Sequence[Found]) -> Known:

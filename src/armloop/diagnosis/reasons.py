@@ -27,6 +27,7 @@ from armloop.identification.goodness import (
     witness,
 )
 from armloop.identification.scoring import too_slow
+from armloop.identification.uncertainty import usual_in_words
 from armloop.laws.effects import Effect
 from armloop.laws.effects.events import ends
 from armloop.model import AddedEffect, ReconstructedModel
@@ -136,12 +137,16 @@ def in_doubt(label: str, share: float) -> str:
     )
 
 
-def masked(added: AddedEffect) -> str:
-    """A sentence on an effect that is plain in the run, but no larger than what the model itself may err by."""
-    return (
-        f"{added.effect.label()} would explain some of what is left there, but is no larger than what the model's own "
-        "coefficients may be wrong by, friction that differs from log to log among them: it is not stated"
-    )
+def masked(labels: Sequence[str]) -> list[str]:
+    """A sentence on effects that are plain in the run, but no larger than what the model itself may err by."""
+    if not labels:
+        return []
+    is_no, it_is = ("is no", "it is") if len(labels) == 1 else ("are no", "they are")
+    which = " and ".join(filter(None, [", ".join(labels[:-1]), labels[-1]]))
+    return [
+        f"{which} would explain some of what is left there, but {is_no} larger than what the model's own coefficients may "
+        f"be wrong by, friction that differs from log to log among them: {it_is} not stated"
+    ]
 
 
 class _Named(Protocol):
@@ -151,14 +156,15 @@ class _Named(Protocol):
     def always(self) -> bool: ...
 
 
-def of_one_log(model: ReconstructedModel, found: Sequence[_Named]) -> list[str]:
-    """A sentence on friction that is found by a model of a single log, which tells nothing of the variance between logs."""
+def of_too_few_logs(model: ReconstructedModel, found: Sequence[_Named]) -> list[str]:
+    """A sentence on friction that is found by a model of a too few logs, which tell nothing of the variance between them."""
     rubbing = [f.effect.label() for f in found if f.effect.rubs and not f.always]
-    if not rubbing or len(model.history.get("logs") or ()) != 1:
+    if not rubbing or model.uncertainty.get("between_logs_known") != "assumed":
         return []
     return [
-        "the model was made from one log, which does not tell by how much the friction of this arm differs from run to run, "
-        f"as where drives warm up: {', '.join(rubbing)} may be no more than that; a model of several logs knows"
+        "the model's logs are too few to tell by how much the friction of this arm differs from run to run, as where drives "
+        f"warm up; it was taken to be {usual_in_words()} of it, and {', '.join(rubbing)} may be no more than that of an arm "
+        "that differs by more: a model of several logs knows"
     ]
 
 
@@ -269,7 +275,7 @@ def _multiple(part: Parts, j: int, ratio: float) -> tuple[str, bool | None]:
     if left > max(SIGNIFICANCE * error, much):
         return (
             f"{size}, and {left / (left + noise):.0%} of its energy can be predicted from the motion, but no listed effect "
-            "nor a law that was found accounts for it",
+            "nor a law that is stated accounts for it",
             True,
         )
     if part.separated and left + error <= much:

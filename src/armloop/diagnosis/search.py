@@ -110,9 +110,9 @@ class _Search:
         barred, self.barred = self.barred, [*self.barred, *(effect.place for effect in unclear)]
         outcome = self._without_stand_ins(self.outcome(), found, [f for f, _ in hidden])
         # of those of one joint the likeliest is told, not what is sought in its place
-        mine = {added.effect.joint for _, added in hidden}
-        elsewhere = (added for added in outcome.masked if added.effect.joint not in mine)
-        outcome = replace(outcome, masked=(*(added for _, added in hidden), *elsewhere))
+        mine = {f.effect.joint for f, _ in hidden}
+        elsewhere = (pair for pair in outcome.masked if pair[0].effect.joint not in mine)
+        outcome = replace(outcome, masked=(*hidden, *elsewhere))
         # What was barred beside others may be worth it, and clear, beside what is there now.
         self.barred = barred
         value = log_posterior(self.evidence, outcome.after.score, [f.effect for f in outcome.found])

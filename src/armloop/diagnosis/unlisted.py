@@ -5,7 +5,8 @@ Listed effects that are part of it are named as what they are; see :mod:`armloop
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -112,7 +113,8 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
     Returns:
         The residual, and the outcome without the effects struck off.
     """
-    j = _left_over(evidence, outcome)
+    # what the model itself may err by is not there to be explained
+    j = _left_over(evidence, with_effects(evidence, outcome, outcome.hidden) if outcome.hidden else outcome)
     if j is None:
         return _one_instead(evidence, outcome, progress)
     progress(f"joint {j + 1}: a residual that no listed effect explains is left; searching its law")
@@ -130,7 +132,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
             return find_law(evidence, bare, progress)
     kept = pruned(evidence, outcome)
     # what the model itself may err by is no law either, whatever listed effects it is a sum of
-    doubtful = bool(law.terms) and law.is_listed(j) and any(j in a.effect.indices for a in outcome.masked)
+    doubtful = bool(law.terms) and law.is_listed(j) and any(j in f.effect.indices for f, _ in outcome.masked)
     return (None if doubtful else _stated(evidence, outcome, law, j)), kept
 
 
@@ -249,10 +251,27 @@ def _with_listed(
 
 
 def _is_likelier(evidence: Evidence, law: Law, named: Score, there: Sequence[Effect], j: int) -> bool:
-    """Whether a law has the larger posterior: each term is one of many functions, as each effect is one of many."""
-    functions = np.log(len(names_of(library_of(tuple(evidence.model.arm.revolute.tolist())), j)))
-    of_law = told(law.score) - len(law.terms) * functions
-    return bool(of_law > told(named.of_joint(j)) + log_prior(evidence, there))
+    """Whether a law has the larger posterior."""
+    of_law = told(law.score) + law_log_prior(evidence, [name for _, name in law.terms], j)
+    return of_law > told(named.of_joint(j)) + log_prior(evidence, there)
+
+
+def law_log_prior(evidence: Evidence, terms: Collection[str], j: int) -> float:
+    """Log prior odds of a law of joint j (0-based) that is not listed against nothing.
+
+    That there is one is one hypothesis more beside the listed ones; each of its terms is as likely one of the functions of
+    the joint's own motion as one of the many others.
+    """
+    arm = evidence.model.arm
+    every = names_of(library_of(tuple(arm.revolute.tolist())), j)
+    own = sum(_is_own(name, j) for name in every)
+    odds = [2 * (own if _is_own(name, j) else len(every) - own) for name in terms]
+    return -float(np.log(len(hypotheses(arm))) + np.log(odds).sum())
+
+
+def _is_own(name: str, j: int) -> bool:
+    """Whether a function is one of the motion of joint j (0-based) alone."""
+    return set(re.findall(r"[qv](\d+)", name)) <= {str(j + 1)}
 
 
 def _stated(evidence: Evidence, outcome: Outcome, law: Law, j: int) -> Unlisted:

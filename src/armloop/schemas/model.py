@@ -246,6 +246,8 @@ class UncertaintyData(Struct):
             description="per joint the covariance of dry level and viscous coefficient",
         ),
     ] = []
+    between_logs_known: Literal["assumed", "alike", "different"] = "different"
+    between_logs_freedom: Positive | None = None
 
 
 class ModelData(Struct):

@@ -1,5 +1,7 @@
 """A shifted encoder on an arm whose torque is known: exact at the shift found, a derivative at none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -28,6 +30,21 @@ def test_its_columns_are_the_change_of_torque_per_radian(context: Context) -> No
     change = offset.torque(context, {"offset": 0.2})
     assert_allclose(change[:, 1], 10 * (np.sin(q - 0.2) - np.sin(q)), atol=1e-9)
     assert not offset.torque(context, {"offset": 0.0}).any()
+
+
+def test_a_ripple_hides_no_shift_of_more_than_a_part_of_its_period(context: Context) -> None:
+    """Where it turns round within small faults the difference is taken over its period, of the longest of several."""
+    offset, q = effect("encoder_offset", 2), context.motion.q[:, 1]
+    for orders, step in (((100.0,), np.pi / 100), ((100.0, 50.0), np.pi / 50), ((100.0, 4.0), np.pi / 100)):
+        rippled = replace(
+            context,
+            predict=lambda motion: np.sin(motion.q) * [1, 10, 100] + 3 * np.cos(100 * motion.q),
+            ripples={1: (30.0,), 2: orders},
+        )
+        slope = 10 * (np.sin(q - step) - np.sin(q + step)) / (2 * step)
+        assert_allclose(offset.columns(rippled, 0.0)[:, 1, 0], slope, atol=1e-9)
+        change = 10 * (np.sin(q - 0.05) - np.sin(q)) + 3 * (np.cos(100 * q - 5.0) - np.cos(100 * q))
+        assert_allclose(offset.columns(rippled, 0.05)[:, 1, 0], change / 0.05, atol=1e-9)
 
 
 def test_a_shift_of_more_than_six_tenths_is_no_small_fault(context: Context) -> None:

@@ -43,7 +43,13 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
     blocks = independent_blocks(motion, errors["block_seconds"])
     friction = model.friction.torque(motion, load=model.joint_load(motion)) * slides
     level = np.sqrt((friction**2).sum(axis=0) / np.maximum(slides.sum(axis=0), 1))
-    return {**errors, "between_logs": between_logs(left, slides, motion, blocks, level)}
+    between = between_logs(left, slides, motion, blocks, level)
+    return {
+        **errors,
+        "between_logs": between.covariances,
+        "between_logs_known": between.known,
+        "between_logs_freedom": between.freedom,
+    }
 
 
 def left_out_null(model: ReconstructedModel, data: Data, found: Found, shared: bool) -> list[dict[str, Any]]:

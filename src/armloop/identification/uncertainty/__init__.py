@@ -1,6 +1,10 @@
 """Uncertainty of a reconstructed model's coefficients: standard errors and covariances."""
 
-from armloop.identification.uncertainty.between_logs import between_logs, friction_spread
+from armloop.identification.uncertainty.between_logs import (
+    between_logs,
+    friction_spread,
+    usual_in_words,
+)
 from armloop.identification.uncertainty.propagated import torque_errors
 from armloop.identification.uncertainty.standard_errors import Errors, Fitted, covariances, standard_errors
 
@@ -12,4 +16,5 @@ __all__ = [
     "friction_spread",
     "standard_errors",
     "torque_errors",
+    "usual_in_words",
 ]

@@ -2,7 +2,8 @@
 
 A drive that warms up, another load of grease: within a log nothing shows it, and so no held-out block and no standard error
 does. Of what the model leaves, each log tells a level and a slope along its joint's direction; how far those lie apart, more
-than blocks of one log do, is the variance between logs, by maximum likelihood (EM; Laird and Ware, Biometrics 38, 1982).
+than blocks of one log do, is the variance between logs (EM; Laird and Ware, Biometrics 38, 1982). What those of measured
+arms show is its prior, worth a few logs: one log tells nothing of it, and friction differs all the same.
 
 Few logs tell the variance of one joint poorly, but the drives of an arm are alike: as parts of each joint's friction all
 joints tell one variance together, and that of each is its posterior mean about it, how unlike joints are being chosen by the
@@ -18,14 +19,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import f as f_distribution
+from scipy.stats import norm, t
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import TINY, Array, Index, Mask
+
+#: (2, 2) of a joint's dry level, N·m (N), and viscous coefficient, N·m·s/rad (N·s/m).
+Covariance = list[list[float]]
 
 #: Where a run begins earlier than the one before it ended, or more than so many s later, another log does.
 _PAUSE = 60.0
@@ -40,6 +46,9 @@ _TIMES, _UNLIKE = np.exp(np.linspace(-12.0, 4.0, 161)), (0.0, 0.5, 1.0, 2.0, 4.0
 _FARTHER = 3.0
 #: Probability that logs which do not differ are taken to.
 _CHANCE = 0.001
+#: What friction is expected to differ by, one standard deviation, dry and viscous, as parts of it: what eight logs of a
+#: UR10e tell; those of a UR5 tell three to five times as much. It counts as much as so many logs that differ from another.
+USUAL, _WORTH = (0.005, 0.011), 2.0
 _ITERATIONS = 200
 
 
@@ -51,13 +60,11 @@ class _Lines:
         b: (G, 2) dry level and viscous coefficient, as parts of the joint's friction.
         S: (G, 2, 2) their covariances by the blocks of all logs.
         freedom: of these.
-        units: (2,) N·m (N) and N·m·s/rad (N·s/m) that are one part.
     """
 
     b: Array
     S: Array
     freedom: int
-    units: Array
 
 
 def log_numbers(motion: Motion) -> Index:
@@ -68,10 +75,23 @@ def log_numbers(motion: Motion) -> Index:
     return np.repeat(numbers, [run.stop - run.start for run in runs]).astype(np.intp)
 
 
-def between_logs(
-    residual: Array, rows: Mask, motion: Motion, blocks: Index, friction: Array
-) -> list[list[list[float]] | None]:
-    """Per joint the (2, 2) covariance of dry level, N·m (N), and viscous coefficient, SI, of one more log; None for none.
+class Between(NamedTuple):
+    """How friction differs from log to log.
+
+    Attributes:
+        covariances: per joint that of its friction in one more log; None of one without friction, and of logs alike.
+        known: ``"assumed"`` where too few logs tell of it, ``"alike"`` where they differ by no more than chance, or
+            ``"different"``.
+        freedom: degrees of freedom that these covariances have, what is expected of them included.
+    """
+
+    covariances: list[Covariance | None]
+    known: str
+    freedom: float
+
+
+def between_logs(residual: Array, rows: Mask, motion: Motion, blocks: Index, friction: Array) -> Between:
+    """The variance of each joint's friction in one more log, beside the mean of those that were seen.
 
     Args:
         residual: (N, n) what the model leaves, N·m (N).
@@ -80,21 +100,33 @@ def between_logs(
         friction: (n,) the friction of each joint, RMS while it slides, N·m (N).
     """
     logs = log_numbers(motion)
+    units = [_units(motion.v[mine, j], float(friction[j])) for j, mine in enumerate(rows.T)]
     lines = [
-        _lines(residual[mine, j], motion.v[mine, j], blocks[mine], logs[mine], float(friction[j]))
+        _lines(residual[mine, j], motion.v[mine, j], blocks[mine], logs[mine], units[j])
         for j, mine in enumerate(rows.T)
     ]
     told = [each for each in lines if each is not None]
-    if sum(len(each.b) - 1 for each in told) < _DIFFERENCES or _chance(told) > _CHANCE:
-        return [None] * len(lines)
-    every = _variance(told)
-    times = iter(_times(told, every))
-    return [None if each is None else _of_a_new_log(each, next(times) * every) for each in lines]
+    known, every, freedom = "assumed", np.diag(np.square(USUAL)), sum(len(each.b) - 1 for each in told)
+    if freedom >= _DIFFERENCES:
+        if _chance(told) > _CHANCE:
+            return Between([None] * len(lines), "alike", _WORTH + freedom)
+        known, every = "different", _variance(told)
+    # one joint is unlike no other
+    times = iter(_times(told, every) if len(told) > 1 else np.ones(len(told)))
+    found: list[Covariance | None] = []
+    for each, own in zip(lines, units, strict=True):
+        seen = len(np.unique(logs)) if each is None else len(each.b)
+        T = every * (1 if each is None else next(times)) * (1 + 1 / seen) * np.outer(own, own)
+        found.append([[float(x) for x in row] for row in T] if own.all() else None)
+    return Between(found, known, _WORTH + freedom)
 
 
-def _lines(left: Array, v: Array, blocks: Index, logs: Index, friction: float) -> _Lines | None:
-    """What each log tells of a joint; None of fewer than two, or where there is no friction to compare with."""
-    units = friction / np.array([1.0, max(float(np.sqrt(np.mean(v**2))) if len(v) else 0.0, TINY)])
+def _lines(left: Array, v: Array, blocks: Index, logs: Index, units: Array) -> _Lines | None:
+    """What each log tells of a joint; None of fewer than two, or where there is no friction to compare with.
+
+    Args:
+        units: (2,) N·m (N) and N·m·s/rad (N·s/m) that are one part of its friction.
+    """
     found, inverses, counts, scores = [], [], [], []
     for log in np.unique(logs):
         own = logs == log
@@ -113,13 +145,13 @@ def _lines(left: Array, v: Array, blocks: Index, logs: Index, friction: float) -
         found.append(b)
         inverses.append(G)
         counts.append((count, len(left[own])))
-    if len(found) < _LOGS or friction <= 0:
+    if len(found) < _LOGS or not units.all():
         return None
     # noise is alike in all logs: each has too few blocks to tell its own
     whole = np.concatenate(scores)
     noise = whole.T @ whole / sum(n for _, n in counts)
     S = [n * G @ noise @ G for G, (_, n) in zip(inverses, counts, strict=True)]
-    return _Lines(np.array(found), np.array(S), sum(count - 1 for count, _ in counts), units)
+    return _Lines(np.array(found), np.array(S), sum(count - 1 for count, _ in counts))
 
 
 def _chance(told: Sequence[_Lines]) -> float:
@@ -131,19 +163,20 @@ def _chance(told: Sequence[_Lines]) -> float:
 
 
 def _variance(told: Sequence[_Lines]) -> Array:
-    """(2, 2) variance between logs that is likeliest of several joints together, as parts of their friction."""
-    T = np.mean([d.T @ d / len(d) for d, _ in (_apart(each.b, each.S) for each in told)], axis=0)
-    logs = sum(len(each.b) for each in told)
+    """(2, 2) variance between logs of several joints together, as parts of their friction: the likeliest a posteriori."""
+    logs = _WORTH + sum(len(each.b) for each in told)
+    # the model was fitted to the logs themselves: their mean is theirs
+    free = (logs - len(told)) / logs
+    prior = T = np.diag(np.square(USUAL)) * free
     for _ in range(_ITERATIONS):
-        total = np.zeros((2, 2))
+        total = _WORTH * prior
         for each in told:
             d, precise = _apart(each.b, T + each.S)
             gain = T @ precise
             m = np.einsum("gij,gj->gi", gain, d)
-            total += m.T @ m + np.sum(T - gain @ T, axis=0)
+            total = total + m.T @ m + np.sum(T - gain @ T, axis=0)
         T = total / logs
-    # the model was fitted to the logs themselves: their mean is theirs
-    return np.asarray(0.5 * (T + T.T) * logs / (logs - len(told)))
+    return np.asarray(0.5 * (T + T.T) / free)
 
 
 def _times(told: Sequence[_Lines], every: Array) -> Array:
@@ -168,10 +201,9 @@ def _log_likelihood(own: _Lines, T: Array) -> float:
     return 0.5 * float(sizes - np.einsum("gi,gij,gj->", d, precise, d))
 
 
-def _of_a_new_log(own: _Lines, T: Array) -> list[list[float]]:
-    """The variance of a joint in SI units, of a log beside the mean of those that were seen."""
-    of_one_more = T * (1 + 1 / len(own.b)) * np.outer(own.units, own.units)
-    return [[float(x) for x in row] for row in of_one_more]
+def _units(v: Array, friction: float) -> Array:
+    """(2,) dry level and viscous coefficient that are one part of a joint's friction; none of one that does not slide."""
+    return friction / np.array([1.0, float(np.sqrt(np.mean(v**2)))]) if len(v) and v.any() else np.zeros(2)
 
 
 def _farther(own: Array, v: Array) -> float:
@@ -194,23 +226,42 @@ def _apart(b: Array, covariance: Array) -> tuple[Array, Array]:
 def friction_spread(model: ReconstructedModel, samples: Samples) -> Array:
     """(N, n, 2) torque of two independent errors of friction, one standard deviation between logs each.
 
-    Through the samples' filter; zero where the training logs agree. The drives of an arm warm up together: it is one error
-    that all joints share, each in its direction in which friction grows.
+    Through the samples' filter. The drives of an arm warm up together: it is one error that all joints share, each in its
+    direction in which friction grows. What few logs tell of a variance is less than it may be: three of these standard
+    deviations are exceeded as rarely as three of a normal variable (Student's t).
     """
     v = samples.motion.v
     torque = np.zeros((*v.shape, 2))
     kept = model.uncertainty.get("between_logs") or []
+    known = model.uncertainty.get("between_logs_known", "different") != "assumed"
+    wider = _wider(model.uncertainty.get("between_logs_freedom") or np.inf) if known else 1.0
     columns = smooth(samples, np.stack([np.sign(v), v], axis=2)) if any(kept) else torque
     for j, T in enumerate(kept):
         if T is not None:
             values, vectors = np.linalg.eigh(np.array(T))
-            vectors *= np.where([1.0, np.mean(np.abs(v[:, j]))] @ vectors < 0, -1.0, 1.0)
+            vectors *= wider * np.where([1.0, np.mean(np.abs(v[:, j]))] @ vectors < 0, -1.0, 1.0)
             torque[:, j] = columns[:, j] @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     return torque
 
 
+def _wider(freedom: float) -> float:
+    """By how much wider Student's t is than a normal variable at three standard deviations."""
+    return float(t.isf(norm.sf(3.0), freedom)) / 3.0
+
+
+def usual_in_words() -> str:
+    """What friction is taken to differ by where the logs do not tell, in words."""
+    dry, viscous = USUAL
+    return f"{dry:.1%} (dry) and {viscous:.1%} (viscous)"
+
+
 def notes(model: ReconstructedModel) -> list[str]:
-    """A line on each joint whose friction differs from log to log."""
+    """A line on each joint whose friction differs from log to log, or one on what is taken for granted of it."""
+    if model.uncertainty.get("between_logs_known") == "assumed":
+        return [
+            "too few logs to tell by how much friction differs from one to the next, as where drives warm up: taken to be "
+            f"{usual_in_words()} of it, as on a measured arm; what a later run shows of it is weighed by that"
+        ]
     found = []
     for j, T in enumerate(model.uncertainty.get("between_logs") or []):
         if T is not None:

@@ -55,11 +55,11 @@ def _directions(rows: Sequence[str]) -> Array:
     return whole
 
 
-def torque_errors(model: ReconstructedModel, samples: Samples) -> Array:
+def torque_errors(model: ReconstructedModel, samples: Samples, between_logs: bool = True) -> Array:
     """(N, n, r) torque of independent errors of the model, one standard deviation each, through the samples' filter.
 
-    Of its coefficients, of friction where it differs between logs, and of a record of the torque that was out of step.
-    None (r = 0) of a model that keeps no directions of its unknowns, such as one made by hand.
+    Of its coefficients, of a record of the torque that was out of step, and of friction where it differs between logs, if
+    that is asked for. None (r = 0) of a model that keeps no directions of its unknowns, such as one made by hand.
     """
     kept: Sequence[dict[str, Any]] = model.uncertainty.get("torque", [])
     # by their names: a file gives a joint's terms back in another order than they were found in
@@ -84,8 +84,8 @@ def torque_errors(model: ReconstructedModel, samples: Samples) -> Array:
     if lag:
         predicted = smooth(samples, model.predict(samples.motion))
         parts.append(lag * rate_along(samples, predicted)[:, :, None])
-    spread = friction_spread(model, samples)
-    parts += [spread] if spread.any() else []
+    if between_logs and (spread := friction_spread(model, samples)).any():
+        parts.append(spread)
     return np.concatenate(parts, axis=2) if parts else np.zeros((*samples.motion.q.shape, 0))
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -114,6 +114,7 @@ class Context:
         predicted: (N, n) the same on this motion, with the sensor faults that come before.
         fading: per joint the speed, rad/s (m/s), over which the direction of the known model's dry friction fades in;
             empty or 0 where it turns at once.
+        ripples: orders of the known model's torque ripples by their joints (1-based).
     """
 
     arm: Arm
@@ -124,6 +125,7 @@ class Context:
     predict: Callable[[Motion], Array] | None = None
     predicted: Array | None = None
     fading: tuple[float, ...] = ()
+    ripples: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
 
     @cached_property
     def unfaulty(self) -> Array:

@@ -32,6 +32,8 @@ class EncoderOffset(Effect):
     mesh: ClassVar = 0.02
     #: Half the step of the derivative, rad (m).
     step = 0.001
+    #: A ripple of a higher order turns round within small faults.
+    slow = 15.0
     #: A larger shift is no small fault, rad (m).
     farthest = 0.6
 
@@ -40,11 +42,17 @@ class EncoderOffset(Effect):
         return float(np.clip(x[0], -self.farthest, self.farthest))
 
     def columns(self, context: Context, shape: float) -> Array:
-        """Change of torque per rad (m) up to the shift ``shape``; at zero the derivative."""
+        """Change of torque per rad (m) up to the shift ``shape``; at zero the derivative.
+
+        That of a ripple tells no shift of more than a part of its period, and hides what the rest of the torque tells: the
+        difference is taken over a period, of the longest of several.
+        """
         if abs(shape) > self.step:
             return ((self._shifted(context, shape) - self._shifted(context, 0.0)) / shape)[:, :, None]
-        change = self._shifted(context, self.step) - self._shifted(context, -self.step)
-        return (change / (2 * self.step))[:, :, None]
+        fast = [order for order in context.ripples.get(self.index + 1, ()) if order > self.slow]
+        step = np.pi / min(fast) if fast else self.step
+        change = self._shifted(context, step) - self._shifted(context, -step)
+        return (change / (2 * step))[:, :, None]
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         return self._shifted(context, number(parameters["offset"])) - self._shifted(context, 0.0)

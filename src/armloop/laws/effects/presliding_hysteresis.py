@@ -26,6 +26,7 @@ class PreslidingHysteresis(Law):
     )
     law = "f z/w with dz = dq, |z| <= w"
     elements = ("hysteresis", "sign")
+    nested = 1  # a level of sign(v) by itself is dry friction
 
     def shapes(self, context: Context) -> Sequence[float]:
         travel = float(np.ptp(context.motion.q[:, self.index]))
