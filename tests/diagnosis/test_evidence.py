@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -201,3 +202,16 @@ def test_a_true_model_leaves_little_of_jumps_of_the_acceleration_and_all_of_a_st
         assert np.sqrt(np.mean(left[rows, j] ** 2)) < 0.3 * np.sqrt(np.mean(lost[rows, j] ** 2))
     # where the joints turn round, friction steps, and the step is as smeared as in the record
     assert np.abs(left).max() < 0.3 * np.abs(lost).max()
+
+
+def test_within_a_log_its_friction_does_not_differ() -> None:
+    model = model_with_baseline()
+    samples = preprocess(
+        [measured(motion_of(3, 5.0), torque(motion_of(3, 5.0)), 3, 0.01)], model.conditioning
+    )
+    between = np.array([0.3, 0.0, 0.4])
+    whole = replace(Evidence.of(model, samples, []), scale=np.array([0.5, 2.0, 0.5]), between=between)
+    own = whole.within_a_log()
+    np.testing.assert_allclose(own.scale, [0.4, 2.0, 0.3])
+    assert not own.between.any() and own.samples is samples
+    np.testing.assert_array_equal(own.within_a_log().scale, own.scale)

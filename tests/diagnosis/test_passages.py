@@ -134,6 +134,15 @@ class TestThereAndBack:
         assert rubs(moved, t, drag, burst)
         assert not rubs(moved, t, setting_out, burst)
 
+    def test_of_few_samples_a_curve_through_them_is_no_function(self) -> None:
+        """Between four of them it goes so near that a tenth of their squares is left, of 1 and 5 at one speed."""
+        v = np.array([0.1, 2.0, 2.01, 0.1, 0.1, 0.1, -2.02, -2.0, 0.1, 0.1])[:, None]
+        moved = Motion(np.arange(10.0), v, v, v, np.array([0]))
+        mean = np.array([0, 1.0, 5.0, 0, 0, 0, -5.2, -5.0, 0, 0])[:, None]
+        assert not rubs(moved, np.arange(10), mean, Burst(slice(1, 3), frozenset({0})))
+        straight = 2 * v * (np.abs(v) > 1)
+        assert rubs(moved, np.arange(10), straight, Burst(slice(1, 3), frozenset({0})))
+
     def test_what_is_left_the_other_way_is_none(self) -> None:
         """A torque of one sign that helps once and hinders once."""
         v, mean = np.full((100, 1), 1.0), np.zeros((100, 1))

@@ -260,7 +260,7 @@ def test_of_a_joint_of_which_something_hidden_is_told_nothing_else_is_suspected(
     joint: int, asked: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hidden = SimpleNamespace(effect=effect("viscous_friction", joint + 1))
-    law = Suspected(effect("coulomb_friction", 2), (1,), 0.8, small=bool(asked))
+    law = Suspected(effect("coulomb_friction", 2), (1,), 0.8, small=bool(asked), errors=9.0)
     answers = Answers(
         monkeypatch, masked=((hidden, hidden),), suspected=[law], of_too_few_logs=["a model of one log"]
     )

@@ -31,6 +31,12 @@ class TestOutcomes:
 
         monkeypatch.setattr(outcomes, "known_with", names)
 
+    def test_what_is_masked_and_was_found_since_is_not_hidden(self) -> None:
+        both, one = self.outcome("a", "b"), self.outcome("b")
+        masked = tuple((f, None) for f in both.found)
+        assert replace(one, masked=masked).hidden == both.found[:1]
+        assert replace(self.outcome(), masked=masked).hidden == both.found and one.hidden == []
+
     def test_what_is_worth_nothing_beside_the_others_goes_the_first_first(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

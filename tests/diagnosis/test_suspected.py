@@ -107,7 +107,7 @@ def test_it_explains_most_and_more_than_could_be_predicted_of_what_the_model_lea
 
 def test_what_is_more_than_the_worst_tenth_is_not_said_to_be_small(monkeypatch: pytest.MonkeyPatch) -> None:
     (one,) = asked_of(monkeypatch, 260.0, 101.0, {})
-    assert not one.small and one.share == pytest.approx(159.0 / 160.0)
+    assert not one.small and one.share == pytest.approx(159.0 / 160.0) and one.errors == 2.5
 
 
 @pytest.mark.parametrize(("errors", "laws", "said"), [(3.5, 1, True), (3.5, 30, False), (5.2, 30, True)])
@@ -129,7 +129,7 @@ def asked_of(
     effects = [effect("coulomb_friction", 1)] * laws
     monkeypatch.setattr(module, "hypotheses", lambda arm: effects)
     monkeypatch.setattr(module, "log_posterior", lambda evidence, score, effects: -score.error)
-    trial = SimpleNamespace(score=score(after, blocks=20))
+    trial = SimpleNamespace(score=score(after, blocks=20), clear=(9.0, 2.5))
     given = SimpleNamespace(fit=SimpleNamespace(score=score(left, blocks=20)), trial=lambda effect: trial)
     monkeypatch.setattr(module.Known, "of", staticmethod(lambda *_: given))
     model = SimpleNamespace(arm=None, baseline={"joints": [known]})
@@ -140,8 +140,13 @@ def asked_of(
 
 
 @pytest.mark.parametrize(
-    ("small", "why"), [(True, "no more than the model leaves at its worst"), (False, "all that is asked")]
+    ("small", "errors", "why"),
+    [
+        (True, 2.5, "no more than the model leaves at its worst"),
+        (False, 2.5, "it is 2.5 of its stated errors from none"),
+        (False, 3.1, "all that is asked"),
+    ],
 )
-def test_the_sentence_names_the_joints(small: bool, why: str) -> None:
-    said = too_little("time_delay", (0, 2), 0.5, small)
+def test_the_sentence_names_the_joints(small: bool, errors: float, why: str) -> None:
+    said = too_little("time_delay", (0, 2), 0.5, small, errors)
     assert said.startswith("joints 1, 3: time_delay would explain 50%") and why in said

@@ -396,7 +396,7 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     if unlisted is None and turned is None:
         unsaid = sorted(set(stand.left) - {j for f, _ in outcome.masked for j in f.effect.indices})
         doubted += [
-            too_little(each.effect.label(), each.joints, each.share, each.small)
+            too_little(each.effect.label(), each.joints, each.share, each.small, each.errors)
             for each in suspected(evidence, outcome.found, unsaid)
         ]
     doubted += of_too_few_logs(model, outcome.found)

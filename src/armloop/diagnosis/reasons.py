@@ -157,7 +157,7 @@ class _Named(Protocol):
 
 
 def of_too_few_logs(model: ReconstructedModel, found: Sequence[_Named]) -> list[str]:
-    """A sentence on friction that is found by a model of a too few logs, which tell nothing of the variance between them."""
+    """A sentence on friction that is found by a model of too few logs to tell the variance between them."""
     rubbing = [f.effect.label() for f in found if f.effect.rubs and not f.always]
     if not rubbing or model.uncertainty.get("between_logs_known") != "assumed":
         return []
@@ -168,13 +168,20 @@ def of_too_few_logs(model: ReconstructedModel, found: Sequence[_Named]) -> list[
     ]
 
 
-def too_little(label: str, joints: Sequence[int], share: float, small: bool) -> str:
-    """A sentence on a law that is no chance in the run at joints (0-based), and not stated, because it is small or else."""
-    why = (
-        "it explains no more than the model leaves at its worst on its own training logs"
-        if small
-        else "it does not pass all that is asked of a law"
-    )
+def too_little(label: str, joints: Sequence[int], share: float, small: bool, errors: float) -> str:
+    """A sentence on a law that is no chance in the run at joints (0-based), and not stated, because it is small or else.
+
+    Args:
+        errors: by how many of its stated errors it is clear of nothing.
+    """
+    if small:
+        why = "it explains no more than the model leaves at its worst on its own training logs"
+    elif errors < SIGNIFICANCE:
+        why = (
+            f"it is {errors:.1f} of its stated errors from none, which hold what the model itself may err by"
+        )
+    else:
+        why = "it does not pass all that is asked of a law"
     return (
         f"{_named(joints)}: {label} would explain {share:.0%} of what is left beyond the baseline, which is no chance; it "
         f"is not stated, for {why}"

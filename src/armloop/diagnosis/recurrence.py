@@ -68,8 +68,8 @@ def rubs(motion: Motion, rows: Index, mean: Array, burst: _Stretch) -> bool:
         return False
     fast = speed >= speed[inside].min()
     X, y = np.vander(speed[fast], 3), along[fast]
-    left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
-    return bool(left @ left < (1 - NEARLY_ALL) * (y @ y))
+    left, (samples, freedom) = y - X @ np.linalg.lstsq(X, y, rcond=None)[0], X.shape
+    return bool(samples * (left @ left) < (1 - NEARLY_ALL) * (samples - freedom) * (y @ y))
 
 
 def _others(same: Mask, inside: slice) -> list[Index]:

@@ -32,12 +32,14 @@ class Suspected:
         joints: those (0-based) at which nothing is named.
         share: part of what is left there beyond the baseline that it explains.
         small: whether that is no more than the model leaves on the worst tenth of its training data.
+        errors: by how many of its stated errors it is clear of nothing.
     """
 
     effect: Effect
     joints: tuple[int, ...]
     share: float
     small: bool
+    errors: float
 
 
 def suspected(evidence: Evidence, found: Sequence[Found], joints: Sequence[int]) -> list[Suspected]:
@@ -60,17 +62,18 @@ def suspected(evidence: Evidence, found: Sequence[Found], joints: Sequence[int])
         return []
     known = Known.of(evidence, there, [f.shape for f in found])
     current, n = known.fit.score, len(evidence.scale)
-    trials = [(effect, trial.score) for effect in asked if (trial := known.trial(effect)) is not None]
+    trials = [(effect, trial) for effect in asked if (trial := known.trial(effect)) is not None]
     blocks = len(np.unique(evidence.blocks))
     surely = float(student.isf(norm.sf(SIGNIFICANCE) / len(asked), max(blocks - 1, 1)))
     least = _shortcomings(evidence)
     said: list[Suspected] = []
     while bare:
         # a law of the whole arm lists no joints
-        mine = [(e, score) for e, score in trials if e.joint is None or set(e.indices) & set(bare)]
+        mine = [(e, trial) for e, trial in trials if e.joint is None or set(e.indices) & set(bare)]
         if not mine:
             break
-        effect, score = max(mine, key=lambda each: log_posterior(evidence, each[1], [each[0]]))
+        effect, trial = max(mine, key=lambda each: log_posterior(evidence, each[1].score, [each[0]]))
+        score = trial.score
         of = tuple(j for j in bare if effect.joint is None or j in effect.indices)
         some = np.isin(np.arange(n), of)
         before, after = current.of_joints(some), score.of_joints(some)
@@ -78,7 +81,7 @@ def suspected(evidence: Evidence, found: Sequence[Found], joints: Sequence[int])
         part = gain(before, after) / max(float(np.maximum(before.excess, 0.0).sum()), TINY)
         if more and part >= MOST and lead(before, after) > surely:
             small = times_enough(evidence, current, score) <= 1
-            said.append(Suspected(effect, of, min(part, 1.0), small))
+            said.append(Suspected(effect, of, min(part, 1.0), small, trial.clear[-1]))
             bare = [j for j in bare if j not in of]
         else:
             trials = [each for each in trials if each[0] is not effect]

@@ -145,8 +145,11 @@ def test_effects_load_friction_if_they_load_the_joint() -> None:
     body: Any = SimpleNamespace(torque=lambda arm, motion, step: np.full((2, 3), 3.0))
     effects: Any = tuple(
         SimpleNamespace(
-            effect=SimpleNamespace(load=load, sensor=False, needs_inertial=False),
+            effect=SimpleNamespace(
+                load=load, sensor=False, needs_inertial=False, joint=None, order=lambda p: 0
+            ),
             torque=lambda context, size=size: np.full((2, 3), size),
+            values={},
         )
         for load, size in ((True, 1.0), (False, 10.0))
     )

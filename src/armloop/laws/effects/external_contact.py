@@ -64,7 +64,11 @@ class ExternalContact(Effect):
         start, end, force = (parameters[key] for key in ("start", "end", "force"))
         size = float(np.linalg.norm(np.asarray(force.value)))
         at = ", ".join(f"{x:.1f}" for x in np.asarray(force.value))
-        where = f"link {number(parameters['link'].value):.0f}" if "link" in parameters else "the tool"
+        where = (
+            f"link {number(parameters['link'].value):.0f} at its far end"
+            if "link" in parameters
+            else "the tool"
+        )
         if "point" in parameters:
             point = ", ".join(f"{x:.2f}" for x in np.asarray(parameters["point"].value))
             where = f"what the last link holds, at ({point}) m in its frame,"
