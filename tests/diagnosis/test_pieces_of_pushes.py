@@ -70,6 +70,13 @@ class TestWhereAForceActs:
         found = pushes._somewhere(self.at(4.0, 3.0), []).added.parameters
         np.testing.assert_allclose(found["link"].std_error, 0.5 / np.sqrt(12))
 
+    def test_what_one_joint_alone_shows_may_be_due_to_a_force_on_any_link_from_that_on(self) -> None:
+        given = self.at(4.0, 3.0)
+        found = pushes._somewhere(given, [], None, 2).added.parameters
+        # at 4, or at 2, 2.5, 3 and 3.5
+        np.testing.assert_allclose(found["link"].std_error, np.sqrt((4 + 2.25 + 1 + 0.25) / 5 + 0.25 / 12))
+        assert found["force"] == pushes._somewhere(given, []).added.parameters["force"]
+
     @pytest.mark.parametrize(("beyond", "error"), [(1.0, np.sqrt(4.0 + 0.09)), (3.1, np.sqrt(0.5 + 0.09))])
     def test_it_may_be_as_far_off_as_a_point_beyond_them_says(self, beyond: float, error: float) -> None:
         points = [self.at(4.5, 2.0), self.at(3.5, 4.0), self.at(4.0, 3.0)]

@@ -50,9 +50,11 @@ class TestChoice:
 
         monkeypatch.setattr(pushes, "_trial", trial)
         self.beyond: list[Any] = []
+        self.alone: list[int | None] = []
 
-        def somewhere(found: Any, points: Any, beyond: Any = None) -> Any:
+        def somewhere(found: Any, points: Any, beyond: Any = None, alone: int | None = None) -> Any:
             self.beyond.append(beyond)
+            self.alone.append(alone)
             return found
 
         monkeypatch.setattr(pushes, "_somewhere", somewhere)
@@ -98,6 +100,7 @@ class TestChoice:
     ) -> None:
         torque = ("external_torque", 1)
         assert self.pushed(monkeypatch, {"t1": 0.9, "f0": 0.86}, 4) == ("f0", [(*torque, 0.9)])
+        assert self.alone == [1]
         assert self.pushed(monkeypatch, {"t1": 0.9, "f0": 0.84}, 4) == ("t1", [])
         # two or three joints feel it as they feel a torque, which is simpler: of the joints that show it
         more = {"t1": 0.7, "f0": 0.9}

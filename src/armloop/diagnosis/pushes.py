@@ -154,7 +154,9 @@ def push(
         return _somewhere(best, anywhere)
     # the joints beyond another link feel nothing of what pushes that
     beyond = force if chosen.link in (0, n) or held > most + FREEDOM else None
-    return _somewhere(best, anywhere, beyond)
+    # what one joint alone shows may be due to a force on any link from that on
+    alone = [kind.effect.joint for _, kind in equals if kind.effect.joint is not None]
+    return _somewhere(best, anywhere, beyond, min(alone, default=None))
 
 
 def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, joint: int) -> Contact | None:
@@ -229,11 +231,14 @@ def _at_a_point(
     return replace(found, added=replace(found.added, parameters=parameters))
 
 
-def _somewhere(found: Contact, points: list[Contact], beyond: Array | None = None) -> Contact:
+def _somewhere(
+    found: Contact, points: list[Contact], beyond: Array | None = None, alone: int | None = None
+) -> Contact:
     """A force on one of these points, nobody knows on which: its error, and its link's, by the law of total variance.
 
     Args:
         beyond: (3,) the force that explains most anywhere on the last link, or on what that holds; it may be as far off.
+        alone: joint a torque on which explains as much: the force may act on any link from that on.
     """
     forces = [point.added.parameters["force"] for point in (found, *points)]
     values, errors = (np.array([getattr(f, of) for f in forces]) for of in ("value", "std_error"))
@@ -244,7 +249,9 @@ def _somewhere(found: Contact, points: list[Contact], beyond: Array | None = Non
     parameters = {**found.added.parameters, "force": replace(forces[0], std_error=error.tolist())}
     if "link" in parameters:
         own = number(parameters["link"].value)
-        off = np.array([0.0, *(number(point.added.parameters["link"].value) - own for point in points)])
+        every = [own, *(number(point.added.parameters["link"].value) for point in points)]
+        every += [] if alone is None else np.arange(alone, own, _STEP).tolist()
+        off = np.array(every) - own
         # it may lie anywhere between two points, too
         error = np.sqrt(np.mean(off**2) + _STEP**2 / 12)
         parameters["link"] = replace(parameters["link"], std_error=float(error))
