@@ -62,7 +62,7 @@ def _rule(name: str, without: Callable[..., Any], *places: tuple[Any, str]) -> R
 diagnosing = sys.modules["armloop.diagnosis.diagnose"]
 RULES = [
     _rule("what comes back with the motion is no event", lambda *_: False, (contacts, "comes_back")),
-    _rule("what rubs there and back is no event", lambda *_: False, (contacts, "rubs")),
+    _rule("what is a function of a joint's speed is no event", lambda *_: False, (contacts, "rubs")),
     _rule(
         "a joint that sticks shows no event of up to twice its friction",
         lambda *_: False,

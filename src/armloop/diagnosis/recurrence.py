@@ -13,6 +13,8 @@ from armloop.util.arrays import Array, Index, Mask
 
 #: Positions and speeds that differ by less than this part of their ranges are the same passage.
 _SAME = 0.05
+#: A joint is about as fast at this part of a speed, and faster.
+_FAST = 0.6
 
 
 class _Stretch(Protocol):
@@ -48,10 +50,10 @@ def comes_back(motion: Motion, rows: Index, level: Array, burst: _Stretch) -> bo
 
 
 def rubs(motion: Motion, rows: Index, mean: Array, burst: _Stretch) -> bool:
-    """Whether a joint alone shows what it does most times that it is as fast, along the way it slides, there or back.
+    """Whether what a joint alone shows, along the way it slides, is a function of its speed: friction that is wrong there.
 
-    It is friction that the model has wrong, at a speed that a run may reach but twice: as the joint swings there and back.
-    Then it is a function of that speed; of a push, which may set the joint going, it is none.
+    Of all samples in which the joint is about as fast, there or back, of which as many must lie elsewhere, a parabola in the
+    speed leaves little. It shows most where a run is fastest, and that may be but once. A push sets in at any speed.
 
     Args:
         rows: (M,) samples.
@@ -63,10 +65,9 @@ def rubs(motion: Motion, rows: Index, mean: Array, burst: _Stretch) -> bool:
     (j,) = burst.joints
     speed, along = np.abs(motion.v[rows, j]), mean[:, j] * np.sign(motion.v[rows, j])
     peak = inside.start + int(np.argmax(np.abs(along[inside])))
-    same, high = np.abs(speed - speed[peak]) < _SAME * speed.max(), MOSTLY * abs(along[peak])
-    if not _most(along[each].mean() * np.sign(along[peak]) > high for each in _others(same, inside)):
+    fast = speed >= _FAST * speed[peak]
+    if np.count_nonzero(_elsewhere(fast, inside)) < np.count_nonzero(fast[inside]):
         return False
-    fast = speed >= speed[inside].min()
     X, y = np.vander(speed[fast], 3), along[fast]
     left, (samples, freedom) = y - X @ np.linalg.lstsq(X, y, rcond=None)[0], X.shape
     return bool(samples * (left @ left) < (1 - NEARLY_ALL) * (samples - freedom) * (y @ y))
@@ -74,10 +75,15 @@ def rubs(motion: Motion, rows: Index, mean: Array, burst: _Stretch) -> bool:
 
 def _others(same: Mask, inside: slice) -> list[Index]:
     """The passages that samples (M,) make up, beside those in a stretch and as near to it as it is long."""
+    times = np.flatnonzero(_elsewhere(same, inside))
+    return np.split(times, np.flatnonzero(np.diff(times) > 1) + 1) if len(times) else []
+
+
+def _elsewhere(same: Mask, inside: slice) -> Mask:
+    """Those of the samples (M,) that are neither in a stretch nor as near to it as it is long."""
     length, elsewhere = inside.stop - inside.start, same.copy()
     elsewhere[max(inside.start - length, 0) : inside.stop - 1 + length] = False
-    times = np.flatnonzero(elsewhere)
-    return np.split(times, np.flatnonzero(np.diff(times) > 1) + 1) if len(times) else []
+    return elsewhere
 
 
 def _most(there: Iterable[bool]) -> bool:
