@@ -8,6 +8,8 @@ import pytest
 
 from armloop.data.motion import Motion
 from armloop.features.rigid_body import full_columns
+from armloop.laws.effects import Estimate, effect
+from armloop.model.added_effect import AddedEffect, ripples
 from armloop.model.components import RigidBody, SparseTerms
 from armloop.robot.arm import load_arm
 
@@ -57,3 +59,15 @@ def test_waves_of_angles_beyond_the_ninth_are_read_as_they_are_written() -> None
     joints: Any = SimpleNamespace(n=11)
     again = SparseTerms.from_dict(terms.to_dict(), joints)
     assert again.waves == (wave,) and again.to_dict() == terms.to_dict()
+
+
+def test_the_orders_of_what_ripples_are_told_by_joint() -> None:
+    given = [
+        ("torque_ripple", 2, 90.0),
+        ("coulomb_friction", 2, 1.0),
+        ("torque_ripple", 2, 180.0),
+        ("torque_ripple", 1, 4.0),
+    ]
+    added = [AddedEffect(effect(name, j), {"order": Estimate(x, 0.0, "1")}) for name, j, x in given]
+    delay = AddedEffect(effect("time_delay"), {"seconds": Estimate(0.01, 0.0, "s")})
+    assert ripples([*added, delay]) == {2: (90.0, 180.0), 1: (4.0,)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,3 +84,13 @@ def _error(value: Any) -> Any:
     if isinstance(value, list):
         return [_error(each) for each in value]
     return math.nan if value is None else value
+
+
+def ripples(effects: Sequence[AddedEffect]) -> dict[int, tuple[float, ...]]:
+    """Orders of the effects that ripple with the angle of a joint, by that joint (1-based)."""
+    found: dict[int, tuple[float, ...]] = {}
+    for added in effects:
+        joint, order = added.effect.joint, added.effect.order(added.values)
+        if joint is not None and order:
+            found[joint] = (*found.get(joint, ()), order)
+    return found

@@ -22,7 +22,7 @@ from armloop.features.rigid_body import full_columns
 from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.base import fill
 from armloop.laws.friction import FrictionLaw
-from armloop.model.added_effect import AddedEffect
+from armloop.model.added_effect import AddedEffect, ripples
 from armloop.model.components import COMPONENTS, Component, RigidBody
 from armloop.model.pointwise import InverseDynamics, Parts, pointwise, stacked
 from armloop.robot.arm import Arm
@@ -172,14 +172,9 @@ class ReconstructedModel:
     def _bare_context(self, motion: Motion, effects: Sequence[Effect]) -> Context:
         inertial = self.carried_parameters() if any(e.needs_inertial for e in effects) else None
         fading = tuple(map(self.friction.fading, range(self.arm.n)))
-        return Context(self.arm, motion, inertial, motion.period, fading=fading, ripples=self._ripples)
-
-    @cached_property
-    def _ripples(self) -> dict[int, tuple[float, ...]]:
-        """Orders of what ripples with a joint's angle, by the joint (1-based)."""
-        every = [(a.effect.joint, a.effect.order(a.values)) for a in self.effects]
-        joints = {j for j, order in every if j is not None and order}
-        return {j: tuple(order for joint, order in every if joint == j and order) for j in joints}
+        return Context(
+            self.arm, motion, inertial, motion.period, fading=fading, ripples=ripples(self.effects)
+        )
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
         """What effects may look at; inertial parameters only where an effect needs them."""
