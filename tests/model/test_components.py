@@ -69,5 +69,5 @@ def test_the_orders_of_what_ripples_are_told_by_joint() -> None:
         ("torque_ripple", 1, 4.0),
     ]
     added = [AddedEffect(effect(name, j), {"order": Estimate(x, 0.0, "1")}) for name, j, x in given]
-    delay = AddedEffect(effect("time_delay"), {"seconds": Estimate(0.01, 0.0, "s")})
+    delay = AddedEffect(effect("time_delay", None), {"seconds": Estimate(0.01, 0.0, "s")})
     assert ripples([*added, delay]) == {2: (90.0, 180.0), 1: (4.0,)}
