@@ -236,3 +236,21 @@ def test_it_must_be_likelier_than_all_else_worth_more_than_all_the_while_and_of_
     monkeypatch.setattr(onset, "_posterior", lambda account, residual, rows: 0.0)
     account: Any = SimpleNamespace(contacts=[], evidence=evidence)
     assert onset._is_told(points, judged, account, np.zeros((4, 3))) == told
+
+
+def test_an_account_is_as_likely_as_its_effects_events_and_law_allow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(onset, "told", lambda score: score)
+    monkeypatch.setattr(onset, "price", lambda evidence, effects: -10.0 * len(effects))
+    monkeypatch.setattr(onset, "law_log_prior", lambda evidence, terms, j: -100.0 * len(terms) - j)
+    law = SimpleNamespace(joint=3, parameters={"v3^3": 1.0, "q3*v3": 2.0, "q_low": [], "q_high": []})
+    given: Any = SimpleNamespace(
+        evidence=None,
+        outcome=SimpleNamespace(after=SimpleNamespace(effects=["friction"])),
+        contacts=[SimpleNamespace(added=SimpleNamespace(effect="push"))],
+        unlisted=None,
+        everywhere=lambda residual, rows: -1.0,
+    )
+    nothing: Any = None
+    assert onset._posterior(given, nothing, nothing) == -21.0
+    given.unlisted = law
+    assert onset._posterior(given, nothing, nothing) == -21.0 - 202.0
