@@ -96,5 +96,7 @@ def test_friction_is_restricted_to_the_laws_named(
     said = capsys.readouterr()
     assert "note: friction: nothing but coulomb, viscous" in said.out
     assert "--jobs is not used: logs of up to 500,000 samples are kept in memory" in said.err
+    # one process it is anyway
+    assert main([*command, *more[:-1], "1", "--force"]) == 0 and "--jobs" not in capsys.readouterr().err
     terms = json.loads((tmp_path / "model.json").read_text())["friction"]
     assert {term["kind"] for joint in terms for term in joint} <= {"smooth_sign", "viscous"}

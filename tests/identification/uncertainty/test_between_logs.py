@@ -22,6 +22,7 @@ from armloop.identification.uncertainty.between_logs import (
     log_numbers,
     notes,
 )
+from armloop.identification.uncertainty.propagated import torque_errors
 
 ONE = np.ones(1)
 
@@ -298,6 +299,9 @@ def test_the_torque_of_one_standard_deviation_grows_with_friction(models: tuple[
     assert (
         spread.shape == (*motion.q.shape, 2) and np.abs(spread[:, [0, 2]]).max() < 0.2 * np.abs(spread).max()
     )
+    # two of the model's errors, unless those of one log are asked for
+    every, own = torque_errors(differing, samples), torque_errors(differing, samples, between_logs=False)
+    np.testing.assert_array_equal(every, np.concatenate([own, spread], axis=2))
     # both errors are friction that grows, as it is where all drives cool down together
     assert (np.einsum("nk,n->k", spread[:, 1], motion.v[:, 1]) >= 0).all()
     assert not friction_spread(alike, samples).any()

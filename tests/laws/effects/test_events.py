@@ -60,6 +60,12 @@ def test_a_force_on_what_the_last_link_holds_acts_at_its_point() -> None:
     )
 
 
+def test_a_force_on_a_link_is_told_to_act_where_it_does() -> None:
+    stated = {"start": 1.0, "end": 2.0, "force": [1.0, -2.0, 3.0], "link": 3.0}
+    words = effect("external_contact", None).sentence({k: Estimate(x, 0.0, "") for k, x in stated.items()})
+    assert words.startswith("something pushed link 3 at its far end with 3.74 N on average")
+
+
 def test_a_force_on_a_link_acts_on_the_joints_before_it() -> None:
     contact, given = effect("external_contact", None), context()
     for link in (0, 2):
