@@ -90,14 +90,14 @@ def test_a_models_own_errors_are_weighted_like_the_rows(monkeypatch: pytest.Monk
         stacking=(np.array([0, 2, 2, 3]), np.array([0, 1, 1, 2]), np.array([0, 0, 1, 1])),
         _places=np.array([0, 2, 3]),
         scale=np.array([0.5, 4.0]),
-        between=np.array([0.0, 1.0]),
+        with_assumed=True,
     )
     expected = [errors[0, 0] / 0.5, errors[2, 0] / 0.5, errors[2, 1] / 4, errors[3, 1] / 4]
     for _ in range(2):  # the second time what is kept
         own.errors = Evidence.errors.fget(own)  # type: ignore[attr-defined]
         np.testing.assert_array_equal(Evidence._model_errors.func(own), expected)  # type: ignore[attr-defined]
     # within a log friction does not differ: these errors are others, and kept beside them
-    own.between = np.zeros(2)
+    own.with_assumed = False
     np.testing.assert_array_equal(Evidence.errors.fget(own), 2 * errors)  # type: ignore[attr-defined]
     assert asked == [True, False]
 
@@ -204,14 +204,31 @@ def test_a_true_model_leaves_little_of_jumps_of_the_acceleration_and_all_of_a_st
     assert np.abs(left).max() < 0.3 * np.abs(lost).max()
 
 
+@pytest.mark.parametrize(("known", "assumed"), [("assumed", True), ("different", False)])
+def test_of_how_friction_differs_the_part_that_is_merely_assumed_is_kept(known: str, assumed: bool) -> None:
+    model = model_with_baseline()
+    spread = {"between_logs": [[[0.04, 0.0], [0.0, 0.0]], None, None], "between_logs_known": known}
+    model = replace(model, uncertainty={**model.uncertainty, **spread})
+    samples = preprocess(
+        [measured(motion_of(3, 5.0), torque(motion_of(3, 5.0)), 3, 0.01)], model.conditioning
+    )
+    whole, bare = Evidence.of(model, samples, []), model.baseline["rmse"][0]
+    assert whole.scale[0] > 1.5 * bare
+    own = whole.within_a_log()
+    assert (own is whole) == (not assumed)
+    if assumed:
+        assert own.scale[0] == pytest.approx(bare)
+        # two directions less
+        assert own.errors.shape[2] == whole.errors.shape[2] - 2
+
+
 def test_within_a_log_its_friction_does_not_differ() -> None:
     model = model_with_baseline()
     samples = preprocess(
         [measured(motion_of(3, 5.0), torque(motion_of(3, 5.0)), 3, 0.01)], model.conditioning
     )
-    between = np.array([0.3, 0.0, 0.4])
-    whole = replace(Evidence.of(model, samples, []), scale=np.array([0.5, 2.0, 0.5]), between=between)
+    assumed = np.array([0.3, 0.0, 0.4])
+    whole = replace(Evidence.of(model, samples, []), scale=np.array([0.5, 2.0, 0.5]), assumed=assumed)
     own = whole.within_a_log()
     np.testing.assert_allclose(own.scale, [0.4, 2.0, 0.3])
-    assert not own.between.any() and own.samples is samples
-    np.testing.assert_array_equal(own.within_a_log().scale, own.scale)
+    assert not own.assumed.any() and own.samples is samples and own.within_a_log() is own

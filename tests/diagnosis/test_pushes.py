@@ -134,14 +134,16 @@ class TestChoice:
     def test_where_no_tool_is_known_what_the_last_link_holds_may_have_been_pushed(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """Where that explains surely more than a force on any link, or than a torque, which is unlikely anyway."""
+        """Where that explains surely more than a force on any link, or than a torque."""
         assert self.pushed(monkeypatch, {"f0": 0.86, "p1": 0.9}, 4, tool=0.0) == ("f0", [])
         assert self.alike is None
-        shares = {"f0": 0.84, "t1": 0.89, "p1": 0.9, "p0.5": 0.84, "p0.75": 0.86, "p1.25": 0.95}
-        assert self.pushed(monkeypatch, shares, 4, tool=0.0) == ("p1", [("external_torque", 1, 0.89)])
+        shares = {"f0": 0.84, "t1": 0.84, "p1": 0.9, "p0.5": 0.84, "p0.75": 0.86, "p1.25": 0.95}
+        assert self.pushed(monkeypatch, shares, 4, tool=0.0) == ("p1", [])
         # it may have been nearer or farther away
         assert self.alike == [(0.86, 0.75), (0.95, 1.25)]
         assert self.pushed(monkeypatch, {"t1": 0.96, "p1": 0.9}, 4, tool=0.0) == ("t1", [])
+        force = ("external_contact", None, 0.9)
+        assert self.pushed(monkeypatch, {"t1": 0.89, "p1": 0.9}, 4, tool=0.0) == ("t1", [force])
 
     @pytest.mark.parametrize(
         ("shares", "joints", "handed_on"),

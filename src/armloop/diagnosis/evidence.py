@@ -82,7 +82,8 @@ class Evidence:
         asked: effects that may be asked about.
         unknown: (N, n) samples of which a joint's torque says nothing, not even that friction may hold it.
         known: effects that the columns of a model are those of, beside its own.
-        between: (n,) the part of ``scale`` by which friction differs from log to log.
+        assumed: (n,) the part of ``scale`` by which friction differs from log to log, where too few logs tell that.
+        with_assumed: whether the model's own errors hold it.
     """
 
     model: ReconstructedModel
@@ -95,7 +96,8 @@ class Evidence:
     asked: tuple[Effect, ...] = ()
     unknown: Mask | None = None
     known: tuple[AddedEffect, ...] = ()
-    between: Array = field(default_factory=lambda: np.zeros(1))
+    assumed: Array = field(default_factory=lambda: np.zeros(1))
+    with_assumed: bool = True
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
     _tried: dict[Place, tuple[float, ...]] = field(default_factory=dict, repr=False)
@@ -111,6 +113,7 @@ class Evidence:
         # what no run of its own shows: friction that differs between the training logs
         between = np.sqrt(np.mean((friction_spread(model, samples) ** 2).sum(axis=2), axis=0))
         scale = np.hypot(scale, between)
+        assumed = between * (model.uncertainty.get("between_logs_known") == "assumed")
         worst = np.array([float(x or 0.0) for x in model.baseline.get("worst", [])] or [0.0])
         variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
         blocks = block_numbers(samples.motion, _block_seconds(samples.motion, shortest_block(model)))
@@ -120,7 +123,7 @@ class Evidence:
         rows &= ~samples.at_an_end[:, None]
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(
-            model, samples, scale, variation, rows, blocks, context, asked, unknown, between=between
+            model, samples, scale, variation, rows, blocks, context, asked, unknown, assumed=assumed
         )
 
     def knowing(self, known: list[AddedEffect]) -> Evidence:
@@ -132,9 +135,14 @@ class Evidence:
         return replace(self, context=context, known=tuple(known), _of_model=_Columns(), _tried={})
 
     def within_a_log(self) -> Evidence:
-        """The same run for what comes and goes in it: its friction is that of one log all the while."""
-        scale = np.sqrt(np.maximum(self.scale**2 - self.between**2, 0.0))
-        return replace(self, scale=scale, between=np.zeros_like(self.between))
+        """The same run for what comes and goes in it: its friction is that of one log all the while.
+
+        What is known of how it differs stays: where a model has friction wrong at some speed, that is no event.
+        """
+        if not self.assumed.any():
+            return self
+        scale = np.sqrt(np.maximum(self.scale**2 - self.assumed**2, 0.0))
+        return replace(self, scale=scale, assumed=np.zeros_like(self.assumed), with_assumed=False)
 
     def tried(self, effect: Effect) -> tuple[float, ...]:
         """Values of an effect's nonlinear parameter to try."""
@@ -211,11 +219,10 @@ class Evidence:
     @property
     def errors(self) -> Array:
         """(M, n, r) torque of the model's own errors at :attr:`independent` samples, one standard deviation each."""
-        differs = bool(self.between.any())
         return self._of_motion.of(
-            ((f"the model's own errors, between logs: {differs}", None, None), None),
+            ((f"the model's own errors, with what is assumed: {self.with_assumed}", None, None), None),
             0.0,
-            lambda: torque_errors(self.model, self.samples, differs)[self.independent],
+            lambda: torque_errors(self.model, self.samples, self.with_assumed)[self.independent],
         )
 
     def smoothed(self, effect: Effect, shape: float) -> Array:

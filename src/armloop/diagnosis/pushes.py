@@ -129,10 +129,11 @@ def push(
         if trial.share >= most - FREEDOM or (not forceful and trial.own >= noticed - FREEDOM)
     ]
 
+    # A torque has one number, a force at a point that is sought has six: that must explain more than it.
     def order(pair: tuple[Contact, _Kind]) -> tuple[bool, bool, int, bool, float]:
         trial, kind = pair
         unlikely = forceful and kind.effect.joint is not None
-        return unlikely, kind.point is not None, kind.effect.complexity, bool(kind.link), -trial.share
+        return kind.point is not None, unlikely, kind.effect.complexity, bool(kind.link), -trial.share
 
     best, chosen = min(equals, key=order)
     if best.own < MOSTLY:

@@ -270,17 +270,6 @@ def test_a_model_of_one_log_takes_the_usual_for_granted_and_says_so() -> None:
         assert len(said) == len(named)
 
 
-def test_what_comes_and_goes_in_a_log_is_not_hidden_by_what_differs_between_logs(
-    models: tuple[Any, Any],
-) -> None:
-    """A torque of four times what friction differs by from day to day stands out as it does of a like baseline without."""
-    differing, _ = models
-    log = worn(9, 0.0, 24.0)
-    pushed = log.tau + 1.5 * ((log.time > 10.0) & (log.time < 11.0))[:, None] * np.array([0.0, 1.0, 0.0])
-    (event,) = diagnose(differing, [replace(log, tau=pushed)], jobs=1).contacts
-    assert event.added.effect.place == ("external_torque", 2, None)
-
-
 def test_the_baseline_of_a_run_holds_what_differs_between_logs(models: tuple[Any, Any]) -> None:
     differing, _ = models
     found = diagnose(differing, [worn(9, 0.0, 24.0)], jobs=1)
