@@ -28,13 +28,13 @@ class Rows:
     def tried(self, effect: Any) -> Any:
         return tried(effect)
 
-    def columns(self, effect: Any, value: float) -> Any:
+    def weighted(self, effect: Any, value: float) -> Any:
         del effect
         self.asked.append(value)
-        return np.full((4, 1, 1), value)
+        return np.full((4, 1), value)
 
     def stack(self, residual: Any, columns: Any) -> Any:
-        return SimpleNamespace(X=columns[0][:, 0], y=residual, fold=np.array([0, 0, 1, 1]))
+        return SimpleNamespace(X=np.hstack(columns), y=residual, fold=np.array([0, 0, 1, 1]))
 
 
 def shaped(refined: Any, tried: tuple[float, ...] = (0.0,)) -> Any:
@@ -45,18 +45,43 @@ def shaped(refined: Any, tried: tuple[float, ...] = (0.0,)) -> Any:
 
 def test_rows_are_made_anew_for_other_nonlinear_parameters_alone() -> None:
     evidence: Any = Rows()
-    problem = fit._Problem(evidence, np.ones(4), [shaped(lambda x, value: value)])
+    problem = fit._Problem(evidence, np.ones(4), [shaped(lambda x, value: value)], {})
     for value in (2.0, 2.0, 3.0, 3.0, 2.0):
-        rows, sizes = problem.rows([value])
-        assert (rows.X == value).all() and sizes == [1]
+        rows = problem.rows([value])
+        assert (rows.stacked.X == value).all() and rows.sizes == [1]
     assert evidence.asked == [2.0, 3.0, 2.0]
+
+
+def test_columns_of_what_is_known_are_made_once_for_all_that_is_tried_beside_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    evidence: Any = Rows()
+    monkeypatch.setattr(fit, "_KEPT", 2)
+    known: fit.Columns = {}
+    for other, value in ((7.0, 2.0), (8.0, 2.0), (9.0, 3.0), (9.0, 4.0), (9.0, 4.0)):
+        effects = [shaped(lambda x, value: value), shaped(lambda x, value: value)]
+        rows = fit._Problem(evidence, np.ones(4), effects, known).rows([value, other])
+        assert (rows.stacked.X == [value, other]).all() and rows.sizes == [1, 1]
+    # no more are kept than two
+    assert evidence.asked == [2.0, 7.0, 8.0, 3.0, 9.0, 4.0, 9.0, 4.0, 9.0]
+
+
+def test_moments_are_those_of_the_rows_outside_a_fold() -> None:
+    rng = np.random.default_rng(5)
+    X, y, fold = rng.normal(size=(9, 2)), rng.normal(size=9), np.array([0, 1, 1, 0, 1, 1, 0, 1, 1])
+    stacked: Any = SimpleNamespace(X=X, y=y, fold=fold)
+    rows = fit._Rows(stacked, [2])
+    for without, own in ((None, fold < 2), (0, fold == 1), (1, fold == 0)):
+        found = rows.moments(without)
+        assert_allclose(found.G, X[own].T @ X[own])
+        assert_allclose(found.b, X[own].T @ y[own])
 
 
 @pytest.mark.parametrize("without", [None, 1])
 def test_a_nonlinear_parameter_is_refined_some_times_or_until_it_stays(without: int | None) -> None:
     evidence: Any = Rows()
     y = np.array([6.0, 6.0, 12.0, 12.0]) if without is not None else np.full(4, 6.0)
-    doubling = fit._Problem(evidence, y, [shaped(lambda x, value: 2 * value)])
+    doubling = fit._Problem(evidence, y, [shaped(lambda x, value: 2 * value)], {})
     rows, (beta, _, J, values) = fit._solved(doubling, [1.0], without)
     last = 2.0**fit.REFINEMENTS
     # what is returned belongs to the rows that are returned
@@ -64,7 +89,7 @@ def test_a_nonlinear_parameter_is_refined_some_times_or_until_it_stays(without: 
     assert_allclose(beta, 6.0 / last)
     assert evidence.asked == [1.0, 2.0, 4.0, 8.0]
     evidence = Rows()
-    staying = fit._Problem(evidence, y, [shaped(lambda x, value: 3.0)])
+    staying = fit._Problem(evidence, y, [shaped(lambda x, value: 3.0)], {})
     assert fit._solved(staying, [1.0], without)[1].values == [3.0]
     assert evidence.asked == [1.0, 3.0]
 
@@ -76,13 +101,13 @@ def test_what_is_judged_is_the_law_at_some_nonlinear_parameter() -> None:
     for ratio, nearest in ((0.2, 0.2), (-0.25, -0.25), (4.0, 0.3), (-4.0, -0.3)):
         evidence: Any = SimpleNamespace(
             tried=tried,
-            columns=lambda effect, value: X[:, None],
+            weighted=lambda effect, value: X,
             stack=lambda residual, columns: SimpleNamespace(
-                X=columns[0][:, 0], y=residual, fold=np.zeros(40, dtype=int)
+                X=columns[0], y=residual, fold=np.zeros(40, dtype=int)
             ),
         )
         y = X @ [2.0, 2.0 * ratio]
-        _, (beta, _, J, _) = fit._solved(fit._Problem(evidence, y, [drift]), [1.0], None)
+        _, (beta, _, J, _) = fit._solved(fit._Problem(evidence, y, [drift], {}), [1.0], None)
         law = X @ [1.0, nearest]
         level = law @ y / (law @ law)  # least squares of what the law can be
         assert_allclose(beta, [level, nearest * level], rtol=1e-6)

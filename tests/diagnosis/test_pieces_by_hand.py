@@ -253,15 +253,20 @@ class TestWhatIsKnownOfARun:
 
     def test_the_torque_of_what_is_known_is_left_in(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(evidence, "smooth", lambda samples, x: 2 * x)
-        model: Any = SimpleNamespace(context=lambda motion, effects: len(effects))
-        model.predict = lambda motion: np.array([[10.0, 20.0]])
-        model.with_effects = lambda known: model
-        samples = SimpleNamespace(motion=motion(1), tau=np.array([[100.0, 200.0]]))
-        own: Any = SimpleNamespace(model=model, samples=samples)
-        known: Any = [SimpleNamespace(effect=k, torque=lambda context, k=k: k * context) for k in (1.0, 2.0)]
-        # less twice of what is predicted but for 2 and 4 of the two
-        np.testing.assert_array_equal(Evidence.residual(own, known), [[100.0 - 8.0, 200.0 - 28.0]])
-        np.testing.assert_array_equal(Evidence.residual(own, []), [[80.0, 160.0]])
+        model: Any = SimpleNamespace(read=lambda context: context.period * np.array([[10.0, 20.0]]))
+        model.with_effects = lambda known: model if len(known) == 2 else None
+        samples = SimpleNamespace(motion=SimpleNamespace(period=1.0), tau=np.array([[100.0, 200.0]]))
+        known: Any = [
+            SimpleNamespace(effect=k, torque=lambda context, k=k: 2 * k * context.period) for k in (1.0, 2.0)
+        ]
+        context = Context(an_arm(), motion(1), period=5.0)
+        knowing: Any = SimpleNamespace(model=model, samples=samples, known=known, context=context)
+        # less twice of what is predicted but for 2 and 4 of the two, with the period of the motion itself
+        left = Evidence.unexplained.func(knowing)
+        np.testing.assert_array_equal(left, [[100.0 - 8.0, 200.0 - 28.0]])
+        own: Any = SimpleNamespace(model=model, left_by=lambda model: "all of it")
+        own.knowing = lambda known: SimpleNamespace(unexplained=known)
+        assert Evidence.residual(own, []) == "all of it" and Evidence.residual(own, known) is known
 
     def test_samples_are_no_finer_than_the_filter_has_left_them(
         self, monkeypatch: pytest.MonkeyPatch

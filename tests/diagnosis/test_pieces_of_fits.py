@@ -37,8 +37,8 @@ class TestRefits:
 
         monkeypatch.setattr(trials, "fit", fitted)
         monkeypatch.setattr(trials, "lead", lambda worse, better: worse.error - better.error)
-        evidence: Any = SimpleNamespace(residual=lambda added: len(fits))
-        evidence.knowing = lambda added: SimpleNamespace(of=len(fits))
+        evidence: Any = SimpleNamespace(residual=lambda added: 0)
+        evidence.knowing = lambda added: SimpleNamespace(unexplained=len(fits))
         return Known.of(evidence, effects, [None] * len(effects)), len(fits)  # type: ignore[list-item]
 
     def test_effects_are_fitted_anew_with_what_they_change_of_each_other(
@@ -122,8 +122,8 @@ class TestTrials:
         )
         asked: list[Any] = []
 
-        def fitted(evidence: Any, residual: Any, effects: Any, shapes: Any) -> Any:
-            asked.append((effects, shapes))
+        def fitted(evidence: Any, residual: Any, effects: Any, shapes: Any, known: Any) -> Any:
+            asked.append((effects, shapes, known))
             solution = Solution(np.zeros(2), [np.zeros(1)] * 2, np.eye(2), [0.0] * 2)
             nothing: Any = SimpleNamespace(X=np.zeros((0, 2)), y=np.zeros(0))
             return Fit(cast(Any, None), tuple(effects), tuple(shapes), solution, np.zeros((2, 0)), nothing)
@@ -141,11 +141,14 @@ class TestTrials:
             plausible=lambda arm, parameters: False, estimates=lambda arm, free, spread, value: {}
         )
         current: Any = SimpleNamespace(effects=(other,), shapes=(Shape.fixed(0.0),))
-        trial = Known(evidence, np.zeros((4, 2)), current).trial(effect)
+        of_effects = Known(evidence, np.zeros((4, 2)), current)
+        of_effects._columns[0, 0.0] = np.ones((1, 1))
+        trial = of_effects.trial(effect)
         assert (trial is not None) == made
         if made:
             shape = chosen if "shapes" in of else Shape.fixed(5.0)
-            assert asked == [([other, effect], [Shape.fixed(0.0), shape])]
+            # with the columns of what was known before
+            assert asked == [([other, effect], [Shape.fixed(0.0), shape], of_effects._columns)]
 
     @pytest.mark.parametrize(
         ("bare", "with_errors", "possible"), [(True, False, True), (False, True, True), (False, False, False)]

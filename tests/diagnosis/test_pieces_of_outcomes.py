@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,6 +14,39 @@ from armloop.diagnosis import outcomes
 from armloop.laws.effects import effect
 
 ANY_ARM: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
+
+
+def test_sets_that_were_asked_for_last_are_fitted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+
+    def fitted(evidence: Any, effects: Any, shapes: Any) -> Any:
+        asked.append((evidence, effects, shapes))
+        return SimpleNamespace(number=len(asked))
+
+    monkeypatch.setattr(outcomes.Known, "of", fitted)
+    monkeypatch.setattr(outcomes, "_RECENT", 2)
+    one, other = (SimpleNamespace(fitted=OrderedDict()) for _ in range(2))
+
+    def number(evidence: Any, *found: tuple[str, float]) -> int:
+        """Which of the fits that were made is answered for effects with these places and shapes."""
+        of: Any = [SimpleNamespace(effect=SimpleNamespace(place=p, onset=None), shape=x) for p, x in found]
+        known: Any = outcomes.known_with(evidence, of)
+        return known.number  # type: ignore[no-any-return]
+
+    assert [number(one, ("a", 1.0)), number(one, ("a", 1.0)), number(one, ("a", 2.0))] == [1, 1, 2]
+    assert asked[1][0] is one and asked[1][2] == [2.0] and asked[1][1][0].place == "a"
+    # of another run nothing is known yet
+    assert number(other, ("a", 1.0)) == 3
+    # the one that was asked for longest ago goes
+    assert [number(one, ("a", 1.0)), number(one, ("a", 1.0), ("b", 0.0)), number(one, ("a", 1.0))] == [
+        1,
+        4,
+        1,
+    ]
+    assert number(one, ("a", 2.0)) == 5 and len(one.fitted) == 2
+    since = SimpleNamespace(effect=SimpleNamespace(place="a", onset="since noon"), shape=1.0)
+    assert outcomes.known_with(cast(Any, one), cast(Any, [since])) is not one.fitted[(("a", None, 2.0),)]
+    assert len(asked) == 6
 
 
 class TestOutcomes:

@@ -134,18 +134,24 @@ def an_evidence() -> Evidence:
     )
 
 
-def test_rows_are_weighed_by_what_the_model_leaves_of_each_joint() -> None:
+def test_rows_are_weighed_by_what_the_model_leaves_of_each_joint(monkeypatch: pytest.MonkeyPatch) -> None:
     given = an_evidence()
     assert given.kept.tolist() == [0, 1, 2, 3, 4]
     assert given.stacking[0].tolist() == [0, 1, 1, 2, 3, 4]
     assert (given.fold == halves(given.blocks)).all()
     residual = np.arange(12.0).reshape(6, 2)
-    columns = 100 + np.arange(10.0).reshape(5, 2, 1)
-    stacked = given.stack(residual, [columns, 2 * columns])
+    columns = 100 + np.arange(12.0).reshape(6, 2, 1)
+    vars(given).update(independent=np.arange(6), _model_errors=np.zeros((6, 0)))
+    monkeypatch.setattr(Evidence, "smoothed", lambda self, effect, shape: shape * effect.columns)
+    everywhere, of_joint_2 = SimpleNamespace(columns=columns), SimpleNamespace(columns=columns[:, 1], index=1)
+    each: list[Any] = [given.weighted(cast(Any, everywhere), shape) for shape in (1.0, 2.0)]
+    stacked = given.stack(residual, each)
     assert stacked.joint.tolist() == [0, 0, 1, 0, 0, 1]
     np.testing.assert_allclose(stacked.y, np.array([0, 2, 3, 4, 6, 9]) / np.array([2, 2, 0.5, 2, 2, 0.5]))
     x = np.array([100, 102, 103, 104, 106, 109]) / np.array([2, 2, 0.5, 2, 2, 0.5])
     np.testing.assert_allclose(stacked.X, np.column_stack([x, 2 * x]))
+    on_joint_2 = given.weighted(cast(Any, of_joint_2), 2.0)
+    np.testing.assert_allclose(on_joint_2[:, 0], 2 * x * (stacked.joint == 1))
     assert stacked.block.tolist() == [0, 0, 0, 1, 1, 2]
     assert (stacked.fold == halves(stacked.block)).all()
     assert given.stack(residual, []).X.shape == (6, 0)

@@ -7,6 +7,7 @@ judged on folds that were not fitted.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -84,6 +85,7 @@ class Evidence:
         known: effects that the columns of a model are those of, beside its own.
         assumed: (n,) the part of ``scale`` by which friction differs from log to log, where too few logs tell that.
         with_assumed: whether the model's own errors hold it.
+        fitted: what was fitted to these rows lately, by effects and their shapes.
     """
 
     model: ReconstructedModel
@@ -98,6 +100,7 @@ class Evidence:
     known: tuple[AddedEffect, ...] = ()
     assumed: Array = field(default_factory=lambda: np.zeros(1))
     with_assumed: bool = True
+    fitted: OrderedDict[tuple[object, ...], Any] = field(default_factory=OrderedDict, init=False, repr=False)
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
     _tried: dict[Place, tuple[float, ...]] = field(default_factory=dict, repr=False)
@@ -166,12 +169,14 @@ class Evidence:
 
         The known effects' own torque is left in, but friction that grows with their load is not.
         """
-        model = self.model.with_effects(known)
-        predicted = model.predict(self.samples.motion)
-        if known:
-            context = model.context(self.samples.motion, [*(a.effect for a in known)])
-            predicted = predicted - sum(added.torque(context) for added in known)
-        return self.samples.tau - smooth(self.samples, predicted)
+        return self.knowing(known).unexplained if known else self.left_by(self.model)
+
+    @cached_property
+    def unexplained(self) -> Array:
+        """(N, n) what is left for the effects that are known, and further ones, to explain, as :meth:`residual`."""
+        context = replace(self.context, period=self.samples.motion.period)
+        predicted = self.model.with_effects(self.known).read(context)
+        return self.samples.tau - smooth(self.samples, predicted - sum(a.torque(context) for a in self.known))
 
     def left_by(self, model: ReconstructedModel) -> Array:
         """(N, n) what a model leaves, which is the run's with effects or without."""
@@ -262,15 +267,33 @@ class Evidence:
         return replace(self, rows=rows)
 
     def stack(self, residual: Array, columns: list[Array]) -> Stacked:
-        """The weighted regression problem of all joints, one row per joint and counted sample."""
-        X = np.concatenate(columns, axis=2) if columns else np.zeros((len(self.kept), residual.shape[1], 0))
-        samples, places, joints = self.stacking
-        weight = 1 / self.scale[joints]
-        return Stacked(
-            X[places, joints] * weight[:, None],
-            residual[samples, joints] * weight,
-            *self._stacked_alike,
-        )
+        """The weighted regression problem of all joints, one row per joint and counted sample.
+
+        Args:
+            columns: (R, p) of each effect, as :meth:`weighted` has them.
+        """
+        samples, _, joints = self.stacking
+        X = np.hstack(columns) if columns else np.zeros((len(joints), 0))
+        return Stacked(X, residual[samples, joints] * self._weight, *self._stacked_alike)
+
+    def weighted(self, effect: Effect, shape: float) -> Array:
+        """(R, p) columns of an effect through the run's filter at the stacked rows, over the scale of each row's joint."""
+        columns, (_, places, joints) = self.smoothed(effect, shape), self.stacking
+        if columns.ndim == 3:
+            return np.asarray(columns[self._places[places], joints] * self._weight[:, None])
+        X, own = np.zeros((len(joints), columns.shape[1])), self._rows_of[effect.index]
+        X[own] = columns[self._places[places[own]]] / self.scale[effect.index]
+        return X
+
+    @cached_property
+    def _weight(self) -> Array:
+        """(R,) one over the scale of each stacked row's joint."""
+        return np.asarray(1 / self.scale[self.stacking[2]])
+
+    @cached_property
+    def _rows_of(self) -> list[Index]:
+        """The stacked rows of each joint."""
+        return [np.flatnonzero(self.stacking[2] == j) for j in range(self.rows.shape[1])]
 
     @cached_property
     def _stacked_alike(self) -> tuple[Index, Index, Index, int, Index, Array]:

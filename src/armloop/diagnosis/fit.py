@@ -16,12 +16,14 @@ from armloop.laws.effects import Effect, Estimate
 from armloop.model import AddedEffect
 from armloop.regression.clustered import clustered_covariance
 from armloop.regression.embedded import RIDGE, solve, unit_scale
-from armloop.regression.moments import Moments
+from armloop.regression.moments import Moments, total
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array
 
 #: Coefficients and a nonlinear parameter are found in turn so many times more.
 REFINEMENTS = 3
+#: Columns of known effects that are kept, at most.
+_KEPT = 32
 
 
 class Shape(NamedTuple):
@@ -156,10 +158,24 @@ class Fit:
         return Score.of(complexity, self.held_out, rows.joint, rows.block, rows.joints)
 
 
-def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: Sequence[Shape]) -> Fit:
-    """Fit effects together; errors are cross-fitted over the folds, parameters come from all blocks."""
+#: Weighted columns by their number among those of a fit, and nonlinear parameter.
+Columns = dict[tuple[int, float], Array]
+
+
+def fit(
+    evidence: Evidence,
+    residual: Array,
+    effects: Sequence[Effect],
+    shapes: Sequence[Shape],
+    known: Columns | None = None,
+) -> Fit:
+    """Fit effects together; errors are cross-fitted over the folds, parameters come from all blocks.
+
+    Args:
+        known: columns of all but the last effect, which are kept there for the next fit beside the same.
+    """
     outside = []
-    problem = _Problem(evidence, residual, effects)
+    problem = _Problem(evidence, residual, effects, {} if known is None else known)
     for k in range(FOLDS):
         judged, without = _solved(problem, [s.without[k] for s in shapes], k)
         outside.append(judged.y - judged.X @ without.beta)
@@ -205,28 +221,57 @@ class _Problem:
     Where no effect has one, all folds share them.
     """
 
-    def __init__(self, evidence: Evidence, residual: Array, effects: Sequence[Effect]) -> None:
+    def __init__(
+        self, evidence: Evidence, residual: Array, effects: Sequence[Effect], known: Columns
+    ) -> None:
         self.evidence, self.effects = evidence, effects
-        self._residual = residual
-        self._last: tuple[list[float], Stacked, list[int]] | None = None
+        self._residual, self._known = residual, known
+        self._last: tuple[list[float], _Rows] | None = None
 
-    def rows(self, values: Sequence[float]) -> tuple[Stacked, list[int]]:
-        """The weighted rows at the effects' nonlinear parameters, and the number of each effect's columns."""
+    def rows(self, values: Sequence[float]) -> _Rows:
+        """The weighted rows at the effects' nonlinear parameters."""
         if self._last is None or self._last[0] != values:
-            columns = [self.evidence.columns(e, value) for e, value in zip(self.effects, values, strict=True)]
+            columns = [self._columns(k, value) for k, value in enumerate(values)]
             stacked = self.evidence.stack(self._residual, columns)
-            self._last = list(values), stacked, [c.shape[2] for c in columns]
-        return self._last[1:]
+            self._last = list(values), _Rows(stacked, [c.shape[1] for c in columns])
+        return self._last[1]
+
+    def _columns(self, k: int, value: float) -> Array:
+        if k == len(self.effects) - 1:
+            return self.evidence.weighted(self.effects[k], value)
+        if (k, value) in self._known:
+            return self._known[k, value]
+        columns = self.evidence.weighted(self.effects[k], value)
+        if len(self._known) < _KEPT:
+            self._known[k, value] = columns
+        return columns
+
+
+class _Rows:
+    """Weighted rows, the number of each effect's columns, and the moments of each fold that were asked for."""
+
+    def __init__(self, stacked: Stacked, sizes: list[int]) -> None:
+        self.stacked, self.sizes = stacked, sizes
+        self._parts: dict[int, Moments] = {}
+
+    def moments(self, without: int | None) -> Moments:
+        """Of all rows, or of those outside a fold."""
+        return total(self._part(k) for k in range(FOLDS) if k != without)
+
+    def _part(self, fold: int) -> Moments:
+        if fold not in self._parts:
+            own = self.stacked.fold == fold
+            self._parts[fold] = Moments.of(self.stacked.X[own], self.stacked.y[own])
+        return self._parts[fold]
 
 
 def _solved(problem: _Problem, values: Sequence[float], without: int | None) -> tuple[Stacked, Solution]:
     """Rows, and the fit on all or on those outside a fold, with nonlinear parameters refined from where they start."""
     values, effects, evidence = list(values), problem.effects, problem.evidence
     for attempt in range(REFINEMENTS + 1):
-        stacked, sizes = problem.rows(values)
-        rows = np.ones(len(stacked.y), dtype=bool) if without is None else stacked.fold != without
-        moments = Moments.of(stacked.X[rows], stacked.y[rows])
-        beta, x, J = solve(moments, [_Judged(effect) for effect in effects], sizes)
+        rows = problem.rows(values)
+        judged = [_Judged(effect) for effect in effects]
+        beta, x, J = solve(rows.moments(without), judged, rows.sizes)
         better = [
             _bounded(e, evidence, refined) if (refined := e.refined(free, value)) != value else value
             for e, free, value in zip(effects, x, values, strict=True)
@@ -234,7 +279,7 @@ def _solved(problem: _Problem, values: Sequence[float], without: int | None) -> 
         if attempt == REFINEMENTS or better == values or np.allclose(better, values, rtol=1e-3):
             break
         values = better
-    return stacked, Solution(beta, x, J, values)
+    return rows.stacked, Solution(beta, x, J, values)
 
 
 def _bounded(effect: Effect, evidence: Evidence, value: float) -> float:

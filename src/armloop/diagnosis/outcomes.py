@@ -20,6 +20,9 @@ from armloop.laws.effects import Effect
 from armloop.model import AddedEffect
 from armloop.util.arrays import Mask
 
+#: Fits of a run that are kept: backward elimination asks for the same few sets again and again.
+_RECENT = 12
+
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -81,8 +84,15 @@ class Outcome:
 
 
 def known_with(evidence: Evidence, found: Sequence[Found]) -> Known:
-    """The run with these effects fitted together."""
-    return Known.of(evidence, [f.effect for f in found], [f.shape for f in found])
+    """The run with these effects fitted together; those of a run that were asked for last are at hand."""
+    recent = evidence.fitted
+    key = tuple((f.effect.place, f.effect.onset, f.shape) for f in found)
+    if key not in recent:
+        recent[key] = Known.of(evidence, [f.effect for f in found], [f.shape for f in found])
+    recent.move_to_end(key)
+    while len(recent) > _RECENT:
+        recent.popitem(last=False)
+    return recent[key]
 
 
 def others_than(found: Sequence[Found], k: int) -> list[Found]:

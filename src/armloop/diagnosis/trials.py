@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from armloop.diagnosis.evidence import FOLDS, Evidence
-from armloop.diagnosis.fit import Fit, Shape, fit
+from armloop.diagnosis.fit import Columns, Fit, Shape, fit
 from armloop.diagnosis.judgement import CHANCE, lead
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, hypotheses
@@ -38,6 +38,7 @@ class Known:
     evidence: Evidence
     residual: Array
     fit: Fit
+    _columns: Columns = field(default_factory=dict, init=False, repr=False)
 
     @staticmethod
     def of(evidence: Evidence, effects: Sequence[Effect] = (), shapes: Sequence[Shape] = ()) -> Known:
@@ -46,8 +47,8 @@ class Known:
         known = Known(evidence, residual, fit(evidence, residual, effects, shapes))
         for _ in range(_REFITS if effects else 0):
             added = known.fit.added()
-            knowing, residual = evidence.knowing(added), evidence.residual(added)
-            again = Known(knowing, residual, fit(knowing, residual, effects, shapes))
+            knowing = evidence.knowing(added)
+            again = Known(knowing, knowing.unexplained, fit(knowing, knowing.unexplained, effects, shapes))
             # What spans the same leaves as much, and yet its parameters are others: those of the effects together.
             if lead(again.fit.score, known.fit.score) > CHANCE or again.agrees_with(known):
                 break
@@ -72,7 +73,8 @@ class Known:
             return None
         one = len(shapes) == 1
         shape = Shape.fixed(shapes[0]) if one else _best_shape(self, effect, shapes)
-        trial = fit(evidence, self.residual, [*current.effects, effect], [*current.shapes, shape])
+        effects, chosen = [*current.effects, effect], [*current.shapes, shape]
+        trial = fit(evidence, self.residual, effects, chosen, self._columns)
         # What is known may be nothing beside it, and of either sign: it is asked again beside this one.
         return trial if trial.is_possible(-1, shapes) else None
 

@@ -121,7 +121,10 @@ class ReconstructedModel:
         if step < 3 or not self.effects:
             rigid = self.rigid_body(motion, step)
             return rigid + self.friction.torque(motion, step, rigid - self._of_rotors(motion, step))
-        context = self.context(motion)
+        return self.read(self.context(motion), sensors)
+
+    def read(self, context: Context, sensors: bool = True) -> Array:
+        """(N, n) what is recorded of a motion, by the model's context of it: the torque, and what faulty sensors add."""
         tau = context.predicted
         assert tau is not None
         # One fault after the other, each on what the one before has left: first where the encoder says the arm is.
@@ -421,16 +424,13 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
             values = ", ".join(f"{key} {e.value}" for key, e in added.parameters.items())
             raise ModelError(f"effect {added.effect.label()}: {values} cannot be; correct it or leave it out")
         for parameter in added.effect.parameters:
-            given, unit = (
-                added.parameters.get(parameter.name),
-                fill(arm, parameter.unit, added.effect.joint),
-            )
+            given = added.parameters.get(parameter.name)
+            unit = fill(arm, parameter.unit, added.effect.joint)
             if given is not None and given.unit not in ("", unit):  # one without a unit has the right one
                 raise ModelError(
                     f"effect {added.effect.label()}: the unit of {parameter.name} is {given.unit!r:.40}; it must be {unit!r}"
                 )
-    half = np.full((1, arm.n), 0.5)
-    probe = Motion(np.zeros(1), half, half, half)
+    probe = Motion(np.zeros(1), *np.full((3, 1, arm.n), 0.5))
     with np.errstate(all="ignore"):  # the line below says it
         tau = model.predict(probe)
     if not np.isfinite(tau).all():
