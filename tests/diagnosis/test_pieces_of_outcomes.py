@@ -186,10 +186,13 @@ class TestOutcomes:
         nothing: Any = None
         outcome = self.outcome("a", "b", "c")
         for found, share in zip(outcome.found, (0.2, 0.5, 0.3), strict=True):
-            found.share = share
+            found.share, found.always = share, False
         made = outcomes.strongest_first(nothing, outcome)
         assert [f.shape for f in made.found] == ["b", "c", "a"]
         assert vars(made.after) == {"score": "bca"} and outcomes.strongest_first(nothing, made) is made
+        # what was there all along comes after what is new
+        made.found[0].always = True  # type: ignore[misc]
+        assert [f.shape for f in outcomes.strongest_first(nothing, made).found] == ["c", "a", "b"]
 
     def test_effects_beside_which_the_others_leave_no_more_go_the_worst_first(
         self, monkeypatch: pytest.MonkeyPatch

@@ -131,8 +131,8 @@ def strengths(evidence: Evidence, outcome: Outcome) -> list[Strength]:
 
 
 def strongest_first(evidence: Evidence, outcome: Outcome) -> Outcome:
-    """The outcome with its effects in the order of their shares."""
-    order = sorted(outcome.found, key=lambda found: -found.share)
+    """The outcome with its effects in the order of their shares, what changed first."""
+    order = sorted(outcome.found, key=lambda found: (found.always, -found.share))
     return outcome if order == outcome.found else _with_only(evidence, outcome, order)
 
 
