@@ -43,6 +43,8 @@ STATED: dict[str, dict[str, Value]] = {
     "friction_drift": {"level": 0.3, "time_constant": 5.0},
     "viscous_asymmetry": {"coefficient": -0.25},
     "joint_spring": {"stiffness": 1.5, "rest": 0.3},
+    "upper_end_stop": {"stiffness": 1.5, "begins": -0.2},
+    "lower_end_stop": {"stiffness": 1.5, "begins": 1.1},
     "torque_ripple": {"amplitude": 0.2, "order": 7.0, "phase": 0.4},
     "presliding_hysteresis": {"level": 0.2, "width": 0.01},
     "rotor_inertia": {"inertia": 0.05},

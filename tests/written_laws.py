@@ -77,6 +77,14 @@ CASES: dict[Place, tuple[Law, dict[str, object]]] = {
         lambda m: on_joint(m, 2, 1.5 * (m.q[:, 1] - 0.3)),
         {"stiffness": 1.5, "rest": 0.3},
     ),
+    ("upper_end_stop", 3): (
+        lambda m: on_joint(m, 3, 2.0 * np.maximum(m.q[:, 2] - 0.25, 0.0)),
+        {"stiffness": 2.0, "begins": 0.25},
+    ),
+    ("lower_end_stop", 1): (
+        lambda m: on_joint(m, 1, 3.0 * np.minimum(m.q[:, 0] + 0.1, 0.0)),
+        {"stiffness": 3.0, "begins": -0.1},
+    ),
     ("torque_ripple", 3): (
         lambda m: on_joint(m, 3, 0.25 * np.sin(9 * m.q[:, 2] + 0.8)),
         {"amplitude": 0.25, "order": 9, "phase": 0.8},

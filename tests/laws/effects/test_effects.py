@@ -36,6 +36,16 @@ LAWS: dict[str, tuple[Law, dict[str, float], float]] = {
         {"stiffness": 2.0, "rest": 0.4},
         0.0,
     ),
+    "upper_end_stop": (
+        on_joint_2(lambda m: 2.0 * np.where(m.q[:, 1] > 0.1, m.q[:, 1] - 0.1, 0.0)),
+        {"stiffness": 2.0, "begins": 0.1},
+        0.1,
+    ),
+    "lower_end_stop": (
+        on_joint_2(lambda m: 3.0 * np.where(m.q[:, 1] < -0.2, m.q[:, 1] + 0.2, 0.0)),
+        {"stiffness": 3.0, "begins": -0.2},
+        -0.2,
+    ),
     "torque_ripple": (
         on_joint_2(lambda m: 0.2 * np.sin(11 * m.q[:, 1] - 0.9)),
         {"amplitude": 0.2, "order": 11.0, "phase": -0.9},
@@ -103,7 +113,7 @@ def build(name: str) -> Effect:
 
 def test_the_published_effects_are_there():
     known = {*LAWS, *OTHERS}
-    assert known <= set(EFFECTS) and len(known) == 22
+    assert known <= set(EFFECTS) and len(known) == 24
     assert all(EFFECTS[name].joint_wise for name in LAWS)
     whole = {"payload", "gravity_tilt", "time_delay", "external_contact", "carried_load"}
     assert {name for name in known if not EFFECTS[name].joint_wise} == whole
@@ -111,7 +121,7 @@ def test_the_published_effects_are_there():
     assert {name for name in known if EFFECTS[name].sensor} == sensors
     labels = [h.label() for h in hypotheses(an_arm()) if h.name in known]
     assert not any("external_torque" in label for label in labels)
-    assert len(labels) == len(set(labels)) == 15 * 3 + 3 + 3
+    assert len(labels) == len(set(labels)) == 17 * 3 + 3 + 3
     assert "viscous_friction at joint 3" in labels and "payload" in labels
     assert "transmission_coupling of joints 1 and 3" in labels
     assert "external_contact" not in labels  # an event: sought before everything else
@@ -333,6 +343,8 @@ def test_standard_errors_follow_from_the_covariance(name, context):
         ("joint_spring", {"stiffness": 1.0, "rest": 0.5}, True),
         ("joint_spring", {"stiffness": -1.0, "rest": 0.5}, False),
         ("joint_spring", {"stiffness": 1.0, "rest": -9.0}, False),
+        ("upper_end_stop", {"stiffness": 1.0, "begins": 0.5}, True),
+        ("lower_end_stop", {"stiffness": -1.0, "begins": 0.5}, False),
         ("gravity_tilt", {"roll": 0.2, "pitch": -0.2}, True),
         ("gravity_tilt", {"roll": 0.59, "pitch": -0.59}, True),
         ("gravity_tilt", {"roll": 0.6, "pitch": 0.0}, False),
@@ -381,6 +393,7 @@ def test_units_are_those_of_the_joint():
         ("coulomb_friction", "level", "N*m", "N"),
         ("joint_spring", "stiffness", "N*m/rad", "N/m"),
         ("joint_spring", "rest", "rad", "m"),
+        ("upper_end_stop", "begins", "rad", "m"),
         ("torque_offset", "offset", "N*m", "N"),
         ("rotor_inertia", "inertia", "kg*m^2", "kg"),
     ):

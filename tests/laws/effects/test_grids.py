@@ -19,6 +19,7 @@ from armloop.robot.kinematics import nominal_parameters
 #: but for one number; presliding friction brings the change of its level.
 FREE = {
     **dict.fromkeys(("friction_drift", "joint_spring", "stribeck_friction", "gravity_tilt"), 2),
+    **dict.fromkeys(("upper_end_stop", "lower_end_stop"), 2),
     **dict.fromkeys(("presliding_hysteresis", "torque_ripple", "external_contact"), 3),
     "transmission_coupling": 4,
     "payload": 5,
@@ -33,7 +34,7 @@ def test_what_a_law_costs_and_what_it_is_made_of() -> None:
 
     assert those("event") == {"external_contact", "external_torque"}
     assert those("searched") == set(STATED) - those("event")
-    assert those("load") == {"payload", "joint_spring", "gravity_tilt"}
+    assert those("load") == {"payload", "joint_spring", "gravity_tilt", "upper_end_stop", "lower_end_stop"}
     assert those("memory") == {*those("event"), "presliding_hysteresis", "friction_drift"}
     assert those("needs_inertial") == {"gravity_tilt"}
     of_model = {
@@ -89,6 +90,13 @@ def test_a_parameter_is_sought_where_the_run_can_show_it() -> None:
     check(grid("stribeck_friction", slow), 2e-3, 2.0, 16)
     slow.motion.v[:, 1] = 2.0
     assert grid("stribeck_friction", slow) == [] == grid("stribeck_friction", context(20.0, v=0.0))
+    # from the side where the joint is free to where it is pushed back, all of it within the travel
+    upper, lower = (grid(f"{side}_end_stop", context(20.0, q=1.0)) for side in ("upper", "lower"))
+    np.testing.assert_allclose(upper, np.linspace(-0.8, 0.9, 8))
+    np.testing.assert_allclose(lower, np.linspace(0.8, -0.9, 8))
+    assert (
+        grid("upper_end_stop", context(20.0, q=0.0)) == [] == grid("lower_end_stop", context(20.0, q=0.009))
+    )
     delays = grid("time_delay", context(1.0))
     check(delays[12:], 0.002, 0.2, 12)
     assert delays[:12] == [-x for x in delays[:11:-1]]
@@ -112,6 +120,11 @@ def test_what_is_refined_stays_near_where_it_was_sought() -> None:
     ends = [stribeck.refined(np.array([size, x]), 0.2) for x in (9.0, -9.0)]
     assert ends[0] / 0.2 == pytest.approx(0.2 / ends[1]) and 1.0 < ends[0] / 0.2 < 3.0
     assert stribeck.refined(np.array([0.0, 0.0]), 0.2) == 0.2
+    # a stop begins at a position, of either sign
+    stop = effect("upper_end_stop", 2)
+    assert stop.refined(np.array([size, -slope / 10]), -0.2) == pytest.approx(-0.21)
+    ends = [stop.refined(np.array([size, x]), -0.2) for x in (9.0, -9.0)]
+    assert ends[0] + 0.2 == pytest.approx(-0.2 - ends[1]) and 0.05 < ends[0] + 0.2 < 0.3
     tried = (0.1, 0.2, 0.4)
     for value, resolved in ((0.1, True), (0.4, True), (0.099, False), (0.401, False)):
         assert stribeck.resolved({"velocity": Estimate(value, 0.0, "")}, tried) == resolved

@@ -26,6 +26,7 @@ KINDS = {
 #: Parameters that a run determines; an event's interval is none of them.
 COMPLEXITY = {
     **dict.fromkeys(("friction_drift", "joint_spring", "stribeck_friction", "gravity_tilt"), 2),
+    **dict.fromkeys(("upper_end_stop", "lower_end_stop"), 2),
     **dict.fromkeys(("presliding_hysteresis", "torque_ripple", "external_contact"), 3),
     "transmission_coupling": 4,
     "payload": 5,

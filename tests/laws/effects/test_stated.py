@@ -338,6 +338,7 @@ LEAST = {
     "friction_drift": ("level",),
     "joint_spring": ("stiffness",),
     "load_dependent_friction": ("coefficient",),
+    "lower_end_stop": ("stiffness",),
     "payload": ("mass", "own_inertia"),
     "presliding_hysteresis": ("level",),
     "quadratic_drag": ("coefficient",),
@@ -345,6 +346,7 @@ LEAST = {
     "stribeck_friction": ("static_excess",),
     "torque_gain": ("gain",),
     "transmission_coupling": ("inertia", "viscous", "coulomb"),
+    "upper_end_stop": ("stiffness",),
     "viscous_friction": ("coefficient",),
 }
 ABOVE = {

@@ -53,8 +53,8 @@ class Law(Effect):
     law: ClassVar[str]
     elements: ClassVar[tuple[Element | str, ...]] = ()
 
-    _LOG_STEP: ClassVar[float] = 0.03
-    #: Beyond this the first order says nothing.
+    #: Changes of the shape (:meth:`_moved`): its derivative is taken by one; beyond the other the first order says nothing.
+    _STEP: ClassVar[float] = 0.03
     _FARTHEST: ClassVar[float] = 0.3
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -111,8 +111,8 @@ class Law(Effect):
     def columns(self, context: Context, shape: float) -> Array:
         found = self.values(context, shape)
         if self._profiled():
-            h = self._LOG_STEP
-            low, high = (self.values(context, shape * float(np.exp(x)))[0] for x in (-h, h))
+            h = self._STEP
+            low, high = (self.values(context, self._moved(shape, x))[0] for x in (-h, h))
             found.insert(1, (high - low) / (2 * h))
         own = np.column_stack(found)
         return own if self.other_joint is None else self._spread(context, own, shape)
@@ -142,7 +142,11 @@ class Law(Effect):
         if not self._profiled():
             return shape
         size = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
-        return shape * float(np.exp(np.clip(x[1] / size, -self._FARTHEST, self._FARTHEST)))
+        return self._moved(shape, float(np.clip(x[1] / size, -self._FARTHEST, self._FARTHEST)))
+
+    def _moved(self, shape: float, by: float) -> float:
+        """The shape changed by so much: its logarithm, as it is positive."""
+        return shape * float(np.exp(by))
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         found, own = super().estimates(arm, x, covariance, shape), self._shape()
