@@ -120,7 +120,8 @@ class Answers:
         return evidence if "best" in self.asked else self.left
 
     def still(self, evidence: Evidence) -> str:
-        return "still" if self.given["still"] else ""
+        still = self.given["still"]
+        return "still" if (still.pop(0) if isinstance(still, list) else still) else ""
 
     def standing(self, evidence: Evidence, model: Any, errors: Any, joints: Any) -> Standing:
         self.asked["standing"] = (evidence.name, model, errors, list(joints))
@@ -200,6 +201,19 @@ def test_an_event_that_may_be_a_law_of_a_run_too_short_to_look_for_one_is_not_st
     found = judged()
     assert found.verdict == "cannot_tell" and found.contacts == [] and found.model == ("with",)
     assert found.reasons == ["not told: push", "still", "stands", "zeros of ['run']"]
+
+
+def test_a_run_that_is_all_events_is_searched_without_those_that_may_be_a_law(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A load that was there all the while looks like one push after the other."""
+    answers = Answers(monkeypatch, still=[True, False], contacts=[CONTACT], untold=True, found=["load"])
+    found = judged(jobs=2)
+    assert answers.asked["best"] == ("whole", [], ("whole", 2)) and answers.asked["laws"] == ("whole", 2)
+    assert found.verdict == "effects_found" and found.contacts == [] and "not told: push" not in found.reasons
+    # what can be told stays, and so little is left that it is all
+    answers = Answers(monkeypatch, still=[True, True, True], contacts=[CONTACT], found=["load"])
+    assert judged().contacts == [CONTACT] and "best" not in answers.asked
 
 
 @pytest.mark.parametrize("turned", [False, True])

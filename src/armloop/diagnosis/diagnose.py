@@ -59,7 +59,7 @@ from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.arrays import Array, Mask
 from armloop.util.errors import InputError
 from armloop.util.finite import finite
-from armloop.util.progress import Progress, silent
+from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import one_thread
 
 SCHEMA = "armloop/diagnosis/2"
@@ -282,9 +282,13 @@ def diagnose(
             )
     whole = Evidence.of(model, samples, hypotheses(model.arm))
     contacts = find_contacts(whole, whole.residual([]))
-    evidence = without(whole, contacts)
+    evidence, untold = without(whole, contacts), list[Contact]()
     if too_still(evidence):
-        found = _by_events_alone(whole, contacts, progress, jobs)
+        # of a run that is all events: a load that was there all the while looks like one push after the other
+        contacts, untold = _told_apart(whole, contacts, progress, jobs)
+        evidence = without(whole, contacts)
+    if too_still(evidence):
+        found = _by_events_alone(whole, contacts, untold)
     else:
         blocks = len(np.unique(evidence.blocks))
         progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
@@ -303,15 +307,23 @@ def _is_left(effect: Effect, outcome: Outcome, left: Sequence[int]) -> bool:
     return effect.place not in stated and bool(set(effect.indices) & set(left))
 
 
-def _by_events_alone(
+def _told_apart(
     whole: Evidence, contacts: list[Contact], progress: Progress, jobs: int | None
-) -> Diagnosis:
-    """The verdict on a run in which too little moves to look for anything but events."""
+) -> tuple[list[Contact], list[Contact]]:
+    """The events of a run that can be told from a law of the motion, though too little is left to search; the rest."""
     with Hypotheses(whole, jobs) as panel:
-        laws = laws_instead(whole, contacts, panel, progress)
+        laws = laws_instead(whole, contacts, panel, paced(progress))
     evidence = without(whole, contacts)
     untold = [contact for contact in contacts if not told(whole, evidence, contact, laws)]
-    contacts = [contact for contact in contacts if contact not in untold]
+    return [contact for contact in contacts if contact not in untold], untold
+
+
+def _by_events_alone(whole: Evidence, contacts: list[Contact], untold: list[Contact]) -> Diagnosis:
+    """The verdict on a run in which too little moves to look for anything but events.
+
+    Args:
+        untold: what may be events, or a law.
+    """
     evidence = without(whole, contacts)
     nothing = fit(evidence, evidence.residual([]), [], [])
     augmented = whole.model.with_effects([contact.added for contact in contacts])
