@@ -106,8 +106,15 @@ def sines(time: np.ndarray, hz: tuple[float, ...] = (0.7, 2.0)) -> MotionLog:
 
 
 def noisy_run(seed: int = 1, rate: float = 100.0, noise: float = 0.0, seconds: float = 40.0) -> MotionLog:
-    """A run whose v has white noise of so many rad/s."""
+    """A run whose v has white noise of so many rad/s, and q as much as makes its derivative no better."""
     motion = fourier_motion(seconds, rate, seed)
     tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
     log = measured(motion, tau, seed)
-    return replace(log, v=log.v + noise * np.random.default_rng(seed).normal(size=log.v.shape))
+    return with_noise(log, noise, seed)
+
+
+def with_noise(log: MotionLog, noise: float, seed: int = 3) -> MotionLog:
+    """A log whose v has white noise of so many rad/s, and whose q, differentiated, is no better below 10 Hz."""
+    rng = np.random.default_rng(seed)
+    v = log.v + noise * rng.normal(size=log.v.shape)
+    return replace(log, v=v, q=log.q + noise / 40 * rng.normal(size=log.q.shape))

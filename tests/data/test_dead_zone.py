@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from synthetic import sines
+from synthetic import sines, with_noise
 
 from armloop.data.creep import may_stick
 from armloop.data.log import MotionLog
@@ -53,11 +53,9 @@ def test_a_reversal_between_two_samples_is_one():
 
 def test_the_dead_zone_follows_the_noise():
     log = sines(np.arange(0, 10, 0.004), (0.25,))
-    rng = np.random.default_rng(3)
-    shares = []
-    for level in (1e-3, 1e-1, 1.0):
-        noisy = replace(log, v=log.v + level * rng.normal(size=log.v.shape))
-        shares.append(float(preprocess([noisy], TEN_HZ).moving.mean()))
+    shares = [
+        float(preprocess([with_noise(log, level)], TEN_HZ).moving.mean()) for level in (1e-3, 1e-1, 1.0)
+    ]
     assert shares[0] > 0.9 and shares[0] > shares[1] + 0.02 and shares[1] > shares[2] + 0.2
 
 

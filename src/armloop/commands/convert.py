@@ -53,8 +53,8 @@ def run(options: Convert) -> None:
     """Convert, or suggest a map."""
     from armloop.commands.shared import print_json, recorded_as, stated_arm
     from armloop.convert import Answers, convert, read_map
-    from armloop.data.log import said_of_log
     from armloop.data.tables import CSV, PARQUET, kind_of, write_columns
+    from armloop.data.torque_unit import said_of_unit
 
     arm = stated_arm(options)
     recorded = recorded_as(options, {"unit": None, "drive_gains": None})
@@ -70,7 +70,7 @@ def run(options: Convert) -> None:
     mapping = read_map(options.map) if options.map else None
     answers = Answers(recorded["unit"], recorded["drive_gains"], options.angle_unit)
     found = convert(options.sources, arm=arm, mapping=mapping, answers=answers, topic=options.topic)
-    write_columns(out, found.columns(), said_of_log(found.log))
+    write_columns(out, found.columns(), said_of_unit(found.log.tau_unit))
     if not options.json:
         _tell(found, out, arm)
         return

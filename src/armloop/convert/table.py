@@ -10,8 +10,8 @@ from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
 from armloop.convert.text import TextTable, numbers_of, read_text
 from armloop.data.header import JOINT_COLUMN
-from armloop.data.log import told_unit
 from armloop.data.tables import PARQUET, is_number, kind_of
+from armloop.data.torque_unit import told_unit
 from armloop.util.errors import LogError
 
 

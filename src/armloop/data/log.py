@@ -19,19 +19,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from armloop.data.dropouts import mended, mended_part
 from armloop.data.header import check_header, columns_of
-from armloop.data.plausibility import doubts, faults
+from armloop.data.plausibility import doubts, faults, is_time_series
+from armloop.data.rate_noise import rate_noise
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import velocity_lag
 from armloop.data.stamps import bridged, coincident
-from armloop.data.tables import place, read_columns, said_of, write_columns
+from armloop.data.tables import place, read_columns, write_columns
+from armloop.data.torque_unit import check_unit, said_of_unit, told_unit
 from armloop.util.arrays import Array, Mask
 from armloop.util.doubts import warn
 from armloop.util.errors import LogError
 from armloop.util.given import path_of
 
-TAU_UNITS = ("N*m", "A")
-#: Under which a Parquet file says what its tau holds, where that is no torque.
-_UNIT = "tau_unit"
 GAP_PERIODS = 10.0
 """A pause longer than this many median sample periods starts a new run."""
 #: Fewer rows than this are no motion: filters and derivatives need more.
@@ -78,7 +77,7 @@ class MotionLog:
         return columns
 
     def __post_init__(self) -> None:
-        _check_unit(self.tau_unit, self.name)
+        check_unit(self.tau_unit, self.name)
         for key in ("time", "q", "v", "tau", "vdot"):
             if key != "vdot" or self.vdot is not None:
                 object.__setattr__(self, key, _numbers(getattr(self, key), key, self.name))
@@ -198,13 +197,32 @@ class MotionLog:
         """The group delay of v behind dq/dt in seconds, 0 if none is sure (see :mod:`armloop.data.redundancy`)."""
         return self._part_of[0].velocity_lag if self._part_of else velocity_lag(mended(self.record))
 
+    @cached_property
+    def of_least_noise(self) -> "MotionLog":
+        """The log with q differentiated in place of a v that has clearly more noise; itself where v has not."""
+        if self._part_of is not None:
+            whole, rows = self._part_of
+            return self if whole.of_least_noise is whole else whole.of_least_noise.stretch(rows)
+        if self.v_derived or not is_time_series(self.q, self.runs()):
+            return self
+        if not rate_noise(mended(self.record)).recorded_is_worse:
+            return self
+        rates = differentiated(self.time, self.q, self.name)
+        return unchecked_log(
+            **{**{f.name: getattr(self, f.name) for f in fields(self)}, "v": rates, "v_derived": True}
+        )
+
     def runs(self) -> list[slice]:
         """Return the stretches without a gap as slices; never filter or differentiate across two of them."""
         return _runs(self.time)
 
     def doubts(self) -> list[str]:
         """Return what may be right and should be known before the log is relied on, one line each."""
-        return [f"{found.columns} {found.text}" for found in doubts(recorded(self))]
+        found = doubts(recorded(self.of_least_noise))
+        if self.of_least_noise is not self:
+            noisy = Finding("columns v", rate_noise(mended(self.record)).sentence())
+            found = chain([noisy], (other for other in found if other.columns != noisy.columns))
+        return [f"{found.columns} {found.text}" for found in found]
 
     def rows_digest(self) -> NDArray[np.uint64]:
         """(N,) a number for each row's q, v and tau, the same for the same digits: equal rows are found by it."""
@@ -254,7 +272,7 @@ def read_log(
     Raises `LogError`, one line that names the file, the column or row, what is wrong and what would be right.
     """
     path = path_of(path, "the path of a log", LogError)
-    _check_unit(tau_unit, path)
+    check_unit(tau_unit, path)
     kinds = check_header(path, joints)
     if tau_unit != "A" and told_unit(path) == "A":
         raise LogError(
@@ -292,22 +310,7 @@ def write_log(path: str | Path, log: MotionLog) -> None:
     where = path_of(path, "the path of a log", LogError)
     if not isinstance(log, MotionLog):
         raise LogError(f"{where}: what is written must be a MotionLog; this is of type {type(log).__name__}")
-    write_columns(where, log.columns(), said_of_log(log))
-
-
-def told_unit(path: Path) -> str | None:
-    """Return what a Parquet file whose header has been read says that its tau is in; None where it does not, as a CSV."""
-    told = said_of(path, _UNIT)
-    if told not in (None, *TAU_UNITS):
-        raise LogError(
-            f"{path}: says of itself that tau is in {told[:40]!r}; it must be one of {', '.join(TAU_UNITS)}"
-        )
-    return told
-
-
-def said_of_log(log: MotionLog) -> dict[str, str]:
-    """Return what a Parquet file of the log has to say beside its columns: that tau is a current, where it is one."""
-    return {_UNIT: log.tau_unit} if log.tau_unit == "A" else {}
+    write_columns(where, log.columns(), said_of_unit(log.tau_unit))
 
 
 def check_log(path: Path, log: MotionLog, first: int = 0) -> None:
@@ -351,11 +354,6 @@ def differentiated(time: Array, q: Array, name: str) -> Array:
 def _side_by_side(columns: dict[str, Array], kinds: Mapping[str, list[str]]) -> dict[str, Array]:
     """(N, n) of each kind of signal, by its columns' names; they are taken out, for all of them may fill the memory."""
     return {kind: np.stack([columns.pop(key) for key in keys], axis=1) for kind, keys in kinds.items()}
-
-
-def _check_unit(unit: Any, label: Any) -> None:
-    if not isinstance(unit, str) or unit not in TAU_UNITS:
-        raise LogError(f"{label}: tau unit {unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
 
 
 def _check_shapes(time: Array, q: Array, name: str) -> None:

@@ -102,6 +102,7 @@ class Speeds:
     @staticmethod
     def of(log: MotionLog, cutoff_hz: float) -> Speeds:
         """Those of one log."""
+        log = log.of_least_noise
         fastest = np.quantile(np.abs(log.v), _FASTEST, axis=0)
         travels = np.ptp(log.q, axis=0) >= _TRAVELS
         return Speeds(velocity_noise(log, cutoff_hz), np.where(travels, fastest, np.inf))
@@ -159,6 +160,7 @@ def preprocess(
     """
     if how.cutoff_hz <= 0:
         return _as_they_are(logs)
+    logs = [log.of_least_noise for log in logs]
     if speeds is None:
         speeds = Speeds.of_all(logs, how.cutoff_hz)
     parts, spans = [], []

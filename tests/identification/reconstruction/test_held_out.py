@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis, with_noise
 
 from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning, preprocess
@@ -30,7 +30,7 @@ def run(seed: int = 3, seconds: float = 40.0, noise: float = 0.0) -> MotionLog:
     tau[:, 1] += 6.0 * (motion.q[:, 1] - 0.3)
     tau[:, 0] += 0.3 * np.sin(101 * motion.q[:, 0])
     log = measured(motion, tau, seed)
-    return replace(log, v=log.v + noise * np.random.default_rng(seed).normal(size=log.v.shape))
+    return with_noise(log, noise, seed)
 
 
 def spoilt(log: MotionLog, intervals: np.ndarray, inside: float = 0.0) -> MotionLog:
