@@ -109,6 +109,17 @@ def test_joints_that_count_the_other_way_are_named(seed: int, joints: tuple[int,
         check_torques([log], three_axis(), 10.0)
 
 
+@pytest.mark.parametrize("joint", [1, 2, 3])
+def test_angles_that_count_against_their_torque_are_named(joint: int) -> None:
+    """Of the first joint, which is upright, it is the same as a torque that counts against its angle."""
+    log, signs = run(2, 1.0), np.where(np.arange(3) == joint - 1, -1.0, 1.0)
+    log = unchecked_log(time=log.time, q=signs * log.q, v=signs * log.v, tau=log.tau, name="run")
+    words = rf"run: q{joint} counts against tau{joint}: with q{joint} and v{joint} of the other sign all torques are"
+    words = "run: the sign of tau1 is turned" if joint == 1 else words
+    with pytest.raises(LogError, match=words):
+        check_torques([log], three_axis(), 10.0)
+
+
 @pytest.mark.parametrize(
     ("seed", "down"),
     [
@@ -245,8 +256,10 @@ class Given:
     def of(self, logs: list[MotionLog], arm: object, cutoff_hz: float, unit: Array) -> Any:
         return self._left("turns" if unit[0] > 1 else "degrees")
 
-    def read(self, order: Index, signs: Array) -> Any:
+    def read(self, order: Index, signs: Array, torque_signs: Array) -> Any:
         turned = ", ".join(str(j + 1) for j in np.flatnonzero(signs < 0))
+        if (torque_signs != signs).any():
+            turned = f"{turned} against tau"
         return self._left(turned or "order") or self._left("plain")
 
     def every(self, step: int) -> Any:
@@ -348,13 +361,16 @@ def test_an_arm_that_hangs_may_be_its_mirror_image(monkeypatch: pytest.MonkeyPat
     ("joints", "sets"), [(2, 3), (6, 63), (7, 127), (8, 8 + 28), (10, 10 + 45), (11, 11)]
 )
 def test_small_arms_are_read_with_every_set_of_joints_turned(joints: int, sets: int) -> None:
-    found = [reading.turned for reading in readings(arm_of("R" * joints)) if reading.turned]
+    every = list(readings(arm_of("R" * joints)))
+    found = [reading.turned for reading in every if reading.turned and not reading.against]
     assert len(set(found)) == len(found) == sets
+    assert [reading.turned for reading in every if reading.against] == [(j,) for j in range(joints)]
 
 
 def test_columns_read_otherwise_are_those_of_the_log_read_so() -> None:
     arm, log, steady = three_axis(), run(3, 1.0), np.ones(3)
-    for reading in (Reading(np.array([2, 0, 1])), Reading(np.arange(3), turned=(0, 2))):
+    against = Reading(np.arange(3), turned=(1,), against=True)
+    for reading in (Reading(np.array([2, 0, 1])), Reading(np.arange(3), turned=(0, 2)), against):
         whole = PlainFits.of([reading.of(log, arm)], arm, 10.0)
         plain = PlainFits.of([log], arm, 10.0)
         assert whole is not None and plain is not None

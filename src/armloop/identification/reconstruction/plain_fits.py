@@ -108,7 +108,7 @@ class PlainFits:
         """(P, n, n, r) mass matrices per unit of each parameter."""
         return mass_columns(self.arm, self.base, self.postures)
 
-    def read(self, order: Index, signs: Array) -> Self:
+    def read(self, order: Index, signs: Array, torque_signs: Array) -> Self:
         """The same with the columns of joint ``order[k]`` in place k, q, v and tau of each times its sign."""
         table, r = self.table, self.base.count
         q, v, vdot = (signs * x[:, order] for x in (table.motion.q, table.motion.v, table.motion.vdot))
@@ -118,7 +118,7 @@ class PlainFits:
         for j, source in enumerate(order):
             own, its = (slice(r + 3 * k, r + 3 * k + 3) for k in (j, source))
             columns[:, j, own] = table.columns[:, source, its] * [signs[j], signs[j], 1.0]
-        tau, moving = signs * table.tau[:, order], table.moving[:, order]
+        tau, moving = torque_signs * table.tau[:, order], table.moving[:, order]
         read = replace(table, columns=columns, tau=tau, moving=moving, motion=motion)
         return replace(self, table=read, postures=signs * self.postures[:, order])
 

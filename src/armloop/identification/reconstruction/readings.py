@@ -59,17 +59,20 @@ class Reading(NamedTuple):
         unit: that of angles, radians if empty.
         turned: joints whose q, v and tau count in the other direction.
         stance: how the arm stands otherwise than its URDF says.
+        against: whether those are joints whose q and v do so, and tau does not.
     """
 
     order: Index
     unit: str = ""
     turned: tuple[int, ...] = ()
     stance: Stance | None = None
+    against: bool = False
 
     def of(self, log: MotionLog, arm: Arm) -> MotionLog:
         """The log as it would be, read so."""
-        scale, signs = self.scale(arm), self.signs
-        signals = {name: signs * getattr(log, name)[:, self.order] for name in ("q", "v", "tau")}
+        scale = self.scale(arm)
+        signs = {"q": self.signs, "v": self.signs, "tau": self.torque_signs}
+        signals = {name: sign * getattr(log, name)[:, self.order] for name, sign in signs.items()}
         signals |= {name: scale * signals[name] for name in ("q", "v")}
         return unchecked_log(time=log.time, name=log.name, **signals)
 
@@ -82,12 +85,21 @@ class Reading(NamedTuple):
         """(n,) -1 for joints that count in the other direction, else 1."""
         return np.where(np.isin(np.arange(len(self.order)), self.turned), -1.0, 1.0)
 
+    @property
+    def torque_signs(self) -> Array:
+        """(n,) the same of tau."""
+        return np.ones(len(self.order)) if self.against else self.signs
+
+    def read(self, plain: PlainFits) -> PlainFits:
+        """What is regressed of the record with its joints in this order and direction."""
+        return plain.read(self.order, self.signs, self.torque_signs)
+
     def problem(self, plain: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float) -> PlainFits | None:
         """What is regressed of the record, read so; None where there is too little motion."""
         if self.stance is not None:
             return plain.as_of(self.stance.of(plain.arm))
         if not self.unit:
-            return plain.read(self.order, self.signs)
+            return self.read(plain)
         # a law of friction that is met badly may be met better at other speeds, and says nothing of a unit
         return PlainFits.of(
             [self.of(log, plain.arm) for log in logs], plain.arm, cutoff_hz, self.scale(plain.arm)
@@ -122,6 +134,12 @@ class Reading(NamedTuple):
             return f"angles seem to be in {self.unit}: read so {better}; give q in rad and v in rad/s"
         if self.stance is not None:
             return self.stance.otherwise(better)
+        if self.against:
+            q, v, tau = (f"{kind}{self.turned[0] + 1}" for kind in ("q", "v", "tau"))
+            return (
+                f"{q} counts against {tau}: with {q} and {v} of the other sign {better}; give them so, or {tau} of the "
+                "other sign with an axis that is turned in the URDF"
+            )
         if self.turned:
             return (
                 f"{self.which()} in the direction against the URDF's axis: with q, v and tau of the other sign {better}; "
@@ -147,6 +165,7 @@ def readings(arm: Arm) -> Iterator[Reading]:
     for size in range(1, arm.n + 1):
         if size <= (2 if arm.n <= _EVERY_PAIR else 1) or arm.n <= _EVERY_SENSE:
             yield from (Reading(as_given, turned=some) for some in combinations(range(arm.n), size))
+    yield from (Reading(as_given, turned=(j,), against=True) for j in range(arm.n))
 
 
 def _orders(n: int) -> Iterator[tuple[int, ...]]:
@@ -184,7 +203,7 @@ def meant(
     stood = (Reading(np.arange(n), stance=stance) for stance in stances)
     for reading in (*stood, *readings(problem.arm)):
         if reading.turned:
-            if first.over(few.read(reading.order, reading.signs).left()) < PROMISING:
+            if first.over(reading.read(few).left()) < PROMISING:
                 continue
         read = reading.problem(problem, logs, cutoff_hz)
         if read is None:
@@ -200,6 +219,7 @@ def meant(
     if reading.slight:
         return "", reading.stance
     # an arm that hangs is its own mirror image, whose joints turn the other way
-    others = [f"; or {other.which()} against the URDF's axes" for other, _ in near if other.turned]
+    mirrored = (other for other, _ in near if other.turned and not other.against)
+    others = [f"; or {other.which()} against the URDF's axes" for other in mirrored]
     hangs = reading.stance is not None and reading.stance.kind == "leaning"
     return reading.words(times) + "".join(others[:1] if hangs else []), None

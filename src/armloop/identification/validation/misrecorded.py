@@ -144,6 +144,8 @@ def _likely(model: ReconstructedModel, samples: Samples) -> list[tuple[str, Samp
 def _read_otherwise(arm: Arm) -> Iterator[tuple[Reading, bool, str]]:
     """Every other reading, whether it is of the torques, too, or of the motion alone; and its words."""
     for reading in readings(arm):
+        if reading.against:
+            continue  # every set of joints is asked so, below
         if reading.unit:
             yield reading, True, f"angles seem to be in {reading.unit}; give q in rad and v in rad/s"
         elif reading.turned:
