@@ -111,6 +111,6 @@ def test_the_stretch_is_the_shortest_of_all_runs_of_blocks(seed: int, blocks: in
 
 def test_the_words_name_both() -> None:
     where = Whereabouts((3.0, 9.5), "joint 2 carries more than 5 N*m", 0.93)
-    words = "it is found from 3.0 to 9.5 s, 93 % of it where joint 2 carries more than 5 N*m"
+    words = "nearly all of it is found from 3.0 to 9.5 s, 93 % of it where joint 2 carries more than 5 N*m"
     assert where.words() == words
     assert replace(where, time=None).words().startswith("it is found all over the run, 93 % of it")

@@ -34,10 +34,12 @@ class Whereabouts:
 
     def words(self) -> str:
         """A sentence without its full stop."""
-        when = "all over the run" if self.time is None else f"from {self.time[0]:.1f} to {self.time[1]:.1f} s"
+        found = "it is found all over the run"
+        if self.time is not None:
+            found = f"nearly all of it is found from {self.time[0]:.1f} to {self.time[1]:.1f} s"
         if not self.condition:
-            return f"it is found {when}, under no condition above all"
-        return f"it is found {when}, {100 * self.share:.0f} % of it where {self.condition}"
+            return f"{found}, under no condition above all"
+        return f"{found}, {100 * self.share:.0f} % of it where {self.condition}"
 
 
 def whereabouts(evidence: Evidence, fit: Fit, joint: int) -> Whereabouts:

@@ -17,8 +17,8 @@
  * tau is the motor current in A: the model was made of currents.
 {% endif %}
 {% if found.has_memory %}
- * Friction with memory is fully slid, and friction that fades gone, in armloop_torque;
- * armloop_torque_memory carries them along in a struct of the caller's.
+ * Friction with memory is fully slid, and friction that fades gone, in armloop_torque, which is what a controller
+ * feeds forward; armloop_torque_memory carries them along in a struct of the caller's, as a log of the motion shows them.
 {% endif %}
  */
 

@@ -56,5 +56,6 @@ class TorqueOffset(Law):
         e = parameters["offset"]
         return (
             f"Subtract {number(e.value):.4g} {e.unit} from the torque readings of joint {self.joint}, or zero the sensor "
-            "with the joint unloaded. The feedforward stays as it is"
+            "with the joint unloaded. The feedforward stays as it is, unless the readings are what a controller commands: "
+            f"then it must command {number(e.value):.4g} {e.unit} in addition"
         )
