@@ -83,9 +83,10 @@ def test_a_log_too_slow_or_too_short_tells_nothing(rate: float, seconds: float) 
 def test_joints_at_rest_and_samples_that_are_no_time_series_tell_nothing() -> None:
     rng = np.random.default_rng(1)
     time, still = np.arange(3000) / 250, np.zeros((3000, 2))
-    record = Recorded(time, still, still + 0.05 * rng.normal(size=still.shape), still, None, [slice(0, 3000)])
-    # no joint of this moves: what little its noise adds up to is below any speed that counts
+    trembles = 1e-5 * rng.normal(size=still.shape)
+    record = Recorded(time, trembles, 0.5 * rng.normal(size=still.shape), still, None, [slice(0, 3000)])
+    # no joint of this moves, and yet what its encoder trembles has a rate
     assert not rate_noise(record).recorded_is_worse and len(rate_noise(record).recorded) == 0
     q, v = rng.uniform(-1, 1, (2, 3000, 2))
-    log = MotionLog(np.arange(3000.0), 1e-3 * q, v, q, vdot=v)
-    assert log.of_least_noise is log
+    log = MotionLog(time, 0.1 * q, 200 * v, q, vdot=v)
+    assert rate_noise(log.record).recorded_is_worse and log.of_least_noise is log
