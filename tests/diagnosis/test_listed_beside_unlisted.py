@@ -63,9 +63,23 @@ def test_a_listed_effect_beside_a_law_is_named_as_what_it_is(
 
 
 def test_an_effect_that_cancels_with_a_law_is_no_effect_of_its_own(model: ReconstructedModel) -> None:
-    """A cable that is taut on one side: an offset of -6 times it beside a cosine, which adds up to it."""
-    found, _ = told(model, 1, lambda q, v: np.maximum(q[:, 1], 0.0) ** 2)
+    """A torque that grows to either side: an offset of a multiple of it beside cosines, which adds up to it."""
+    found, _ = told(model, 1, lambda q, v: np.maximum(np.abs(q[:, 1]) - 0.3, 0.0) ** 2)
     assert (found.verdict, found.outcome.found) == ("unlisted_effect", [])
+
+
+def test_a_stop_stands_in_for_no_law_of_which_it_leaves_much_that_is_none(model: ReconstructedModel) -> None:
+    """To one side of a torque that grows to both a stop is near, and what it leaves is no law of the library."""
+    found, _ = told(model, 1, lambda q, v: q[:, 1] ** 4)
+    assert (found.verdict, found.outcome.found) == ("unlisted_effect", []) and found.unlisted is not None
+    assert found.unlisted.rmse_with_form < 0.2 * found.unlisted.rmse and "upper_end_stop" in found.reasons[0]
+
+
+def test_a_cable_that_pulls_taut_is_a_stop(model: ReconstructedModel) -> None:
+    """The more it is stretched the stiffer it is; a straight line is as near as the model itself is."""
+    found, _ = told(model, 1, lambda q, v: np.maximum(q[:, 1], 0.0) ** 2)
+    named = [(f.effect.name, f.effect.joint) for f in found.outcome.found]
+    assert (found.verdict, named, found.unlisted) == ("effects_found", [("upper_end_stop", 2)], None)
 
 
 def test_no_listed_effect_stands_in_for_a_part_of_a_law_that_is_not_met(model: ReconstructedModel) -> None:

@@ -117,11 +117,14 @@ class Answers:
         return answer
 
     def without(self, evidence: Evidence, contacts: Any) -> Evidence:
-        return evidence if "best" in self.asked else self.left
+        whole = "best" in self.asked or (
+            "laws" in self.asked and not contacts and self.given["still"] is not True
+        )
+        return evidence if whole else self.left
 
     def still(self, evidence: Evidence) -> str:
         still = self.given["still"]
-        return "still" if (still.pop(0) if isinstance(still, list) else still) else ""
+        return "still" if (evidence.name in still if isinstance(still, tuple) else still) else ""
 
     def standing(self, evidence: Evidence, model: Any, errors: Any, joints: Any) -> Standing:
         self.asked["standing"] = (evidence.name, model, errors, list(joints))
@@ -207,12 +210,12 @@ def test_a_run_that_is_all_events_is_searched_without_those_that_may_be_a_law(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A load that was there all the while looks like one push after the other."""
-    answers = Answers(monkeypatch, still=[True, False], contacts=[CONTACT], untold=True, found=["load"])
+    answers = Answers(monkeypatch, still=("left",), contacts=[CONTACT], untold=True, found=["load"])
     found = judged(jobs=2)
     assert answers.asked["best"] == ("whole", [], ("whole", 2)) and answers.asked["laws"] == ("whole", 2)
     assert found.verdict == "effects_found" and found.contacts == [] and "not told: push" not in found.reasons
     # what can be told stays, and so little is left that it is all
-    answers = Answers(monkeypatch, still=[True, True, True], contacts=[CONTACT], found=["load"])
+    answers = Answers(monkeypatch, still=("left",), contacts=[CONTACT], found=["load"])
     assert judged().contacts == [CONTACT] and "best" not in answers.asked
 
 

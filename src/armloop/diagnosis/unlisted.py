@@ -126,7 +126,9 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
         stated = _stated(evidence, with_effects(evidence, kept, listed), split, j)
         return stated, with_effects(without_law(evidence, stated), kept, listed)
     if len(bare.found) < len(outcome.found):
-        if _is_simpler(evidence, simpler, outcome, bare, j):
+        if _is_simpler(evidence, simpler, outcome, bare, j) or (
+            not law.terms and _is_far_likelier(evidence, simpler, outcome, bare, j)
+        ):
             return _in_place(evidence, outcome, bare, simpler, j)
         elif outcome.after.score.energy[j] > FORCED * bare.after.score.energy[j]:
             return find_law(evidence, bare, progress)
@@ -187,6 +189,18 @@ def _is_simpler(evidence: Evidence, law: Law, outcome: Outcome, bare: Outcome, j
     if _leaves_far_less(law.score, outcome.after.score.of_joint(j)):
         return True
     return len(law.terms) < parameters and _is_likelier(evidence, law, outcome.after.score, there, j)
+
+
+def _is_far_likelier(evidence: Evidence, law: Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
+    """Whether a law, of however many parameters, is likelier than the effects in whose place it is put, and leaves far less.
+
+    It is asked where what they leave is real, and is no law: a stop is near any torque that grows to one side.
+    """
+    there = [f.effect for f in outcome.found if f not in bare.found]
+    named = outcome.after.score
+    if not law.terms or law.is_listed(j) or not _leaves_far_less(law.score, named.of_joint(j)):
+        return False
+    return _is_likelier(evidence, law, named, there, j)
 
 
 def _leaves_far_less(law: Score, other: Score) -> bool:

@@ -80,15 +80,16 @@ def watched(model: ReconstructedModel) -> tuple[tuple[Effect, float], ...]:
     """The effects whose columns are kept, each with one value of its nonlinear parameter.
 
     They are those of a diagnosis that depend on the state alone. Left out are effects with memory (their columns need
-    the whole path), spectra, couplings of joints that are not neighbours, and effects whose search grid is empty (they
-    cannot be there, such as the ripple of a sliding joint). The nonlinear parameter is the middle one of those tried on
-    a motion that fills the ranges the model was fitted on: it must not depend on the log, or sums of different logs
-    would not add.
+    the whole path), stops (what was not met while learning looks changed), spectra, couplings of joints that are not
+    neighbours, and effects whose search grid is empty (they cannot be there, such as the ripple of a sliding joint). The
+    nonlinear parameter is the middle one of those tried on a motion that fills the ranges the model was fitted on: it must
+    not depend on the log, or sums of different logs would not add.
     """
     kept = [
         e
         for e in hypotheses(model.arm)
-        if not e.memory
+        if e.watched
+        and not e.memory
         and not (e.pair_wise and e.joint and e.other_joint and abs(e.joint - e.other_joint) > 1)
     ]
     rng = np.random.default_rng(0)

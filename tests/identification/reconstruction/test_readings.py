@@ -344,6 +344,12 @@ def test_what_is_explained_well_is_not_asked_of(monkeypatch: pytest.MonkeyPatch)
     assert "revolutions" in chosen(fit_of([0.01, 0.031]), better, monkeypatch)
 
 
+def test_a_reading_that_leaves_much_of_a_joint_may_be_of_another_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain, words = fit_of([0.9, 0.2, 0.31]), "; joint 3 is still off by 30%: or the URDF is of another arm"
+    assert chosen(plain, {"1": fit_of([0.1, 0.1, 0.3])}, monkeypatch).endswith(words)
+    assert "another arm" not in chosen(plain, {"1": fit_of([0.1, 0.1, 0.24])}, monkeypatch)
+
+
 def test_an_arm_that_hangs_may_be_its_mirror_image(monkeypatch: pytest.MonkeyPatch) -> None:
     plain, hangs = fit_of([0.3, 0.2]), fit_of([0.1, 0.1])
     said = chosen(plain, {"up": hangs, "1, 2": fit_of([0.1, 0.1])}, monkeypatch)
@@ -352,6 +358,8 @@ def test_an_arm_that_hangs_may_be_its_mirror_image(monkeypatch: pytest.MonkeyPat
     )
     assert said.count("; or") == 1
     assert "; or" not in chosen(plain, {"up": hangs}, monkeypatch)
+    # angles that count against their torques are no mirror image
+    assert "; or" not in chosen(plain, {"up": hangs, "2 against tau": fit_of([0.1, 0.1])}, monkeypatch)
     # a joint with another zero is not
     said = chosen(plain, {"zero": hangs, "1, 2": fit_of([0.1, 0.1])}, monkeypatch)
     assert "joint 1 counts from another zero" in said and "; or" not in said

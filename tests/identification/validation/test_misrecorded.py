@@ -97,6 +97,11 @@ def test_a_log_that_the_model_explains_by_half_is_not_asked_of(
         said(model, replace(log, tau=2.2 * log.tau))
 
 
+def test_every_reading_is_asked_of_once(model: ReconstructedModel) -> None:
+    words = [words for _, _, words in misrecorded_module._read_otherwise(model.arm)]
+    assert len(words) == len(set(words))
+
+
 def test_a_reading_takes_signals_torques_and_what_slides_of_the_columns_it_is_of(
     model: ReconstructedModel,
 ) -> None:

@@ -31,6 +31,8 @@ from armloop.util.arrays import Array, Index
 
 #: Mean relative error below which a record is taken as it stands; of a joint that is met so well, better says nothing.
 _GOOD_ENOUGH = 0.02
+#: Relative error of a joint from which on the reading that explains all others better is doubtful itself.
+_POOR = 0.25
 #: Another order must lower the relative error by this factor (geometric mean of all joints), another unit by this one,
 #: every joint's to a good one: orders are many, and springs as strong as all the rest on all joints made one of them twice
 #: as good; units are two, and no law made one better than by a fifth.
@@ -196,6 +198,7 @@ def meant(
         return "", None
     n = len(plain.relative)
     found: list[tuple[Reading, float]] = []
+    poorly: dict[int, str] = {}
     few = problem.every(SCREENED)
     first = few.left()
     sprung = problem.sprung().fit(np.ones(n), np.arange(n))
@@ -211,6 +214,7 @@ def meant(
         other = read.fit(np.ones(n), np.arange(n))
         if reading.slight or reading.far_better(plain, other, sprung):
             found.append((reading, plain.over(other)))
+            poorly[id(reading)] = _another_arm(other)
     best = max((times for _, times in found), default=0.0)
     near = sorted((pair for pair in found if pair[1] >= AS_GOOD * best), key=lambda pair: len(pair[0].turned))
     if not near:
@@ -222,4 +226,12 @@ def meant(
     mirrored = (other for other, _ in near if other.turned and not other.against)
     others = [f"; or {other.which()} against the URDF's axes" for other in mirrored]
     hangs = reading.stance is not None and reading.stance.kind == "leaning"
-    return reading.words(times) + "".join(others[:1] if hangs else []), None
+    return reading.words(times) + "".join(others[:1] if hangs else []) + poorly[id(reading)], None
+
+
+def _another_arm(fit: Fit) -> str:
+    """What a reading may still be wrong about, where it leaves much of some joint."""
+    worst = int(np.argmax(fit.relative))
+    if fit.relative[worst] < _POOR:
+        return ""
+    return f"; joint {worst + 1} is still off by {fit.relative[worst]:.0%}: or the URDF is of another arm"

@@ -22,6 +22,7 @@ class _EndStop(Law):
 
     needs_model = False
     load = True
+    watched = False
     #: rad (m).
     _STEP = 0.005
     _FARTHEST = 0.1
