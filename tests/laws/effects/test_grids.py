@@ -124,7 +124,7 @@ def test_what_is_refined_stays_near_where_it_was_sought() -> None:
     stop = effect("upper_end_stop", 2)
     found = {"stiffness": Estimate(2.0, 0.1, "N*m/rad"), "begins": Estimate(-0.3, 0.01, "rad")}
     for side, where in (("upper", "above"), ("lower", "below")):
-        words = f"{where} -0.300 ± 0.01 rad a stop pushes joint 2 back with 2.00 ± 0.10 N*m/rad; on the other side it is "
+        words = f"{where} -0.300 ± 0.010 rad a stop pushes joint 2 back with 2.00 ± 0.10 N*m/rad; on the other side it is "
         assert effect(f"{side}_end_stop", 2).sentence(found) == f"{words}free"
     assert stop.refined(np.array([size, -slope / 10]), -0.2) == pytest.approx(-0.21)
     ends = [stop.refined(np.array([size, x]), -0.2) for x in (9.0, -9.0)]

@@ -43,6 +43,8 @@ _NEW = 2e-3
 #: What comes and goes: the arm as it was trained carries what it carries.
 _OF_A_RUN = ("payload",)
 _MOST = 6
+#: A shape is refined to first order so many times at most.
+_REFINEMENTS = 4
 #: More shapes than these are not tried one by one.
 _FEW = 8
 
@@ -281,12 +283,24 @@ def _peaks(own: Projected, effect: Effect, orders: Sequence[float], context: Con
 def _best_shape(
     own: Projected, effect: Effect, shapes: Sequence[float], context: Context, samples: Samples
 ) -> tuple[float, Trial] | None:
-    """The shape that removes most on left-out blocks; None where the effect can say nothing new."""
+    """The shape that removes most on left-out blocks, refined; None where the effect can say nothing new."""
     best: tuple[float, Trial] | None = None
-    for shape in shapes:
+
+    def better(shape: float) -> bool:
+        nonlocal best
         trial = own.trial(_smoothed(samples, effect.fixed_columns(context, shape)), _NEW, WORTH)
-        if trial is not None and (best is None or trial.removed > best[1].removed):
-            best = shape, trial
+        if trial is None or (best is not None and trial.removed <= best[1].removed):
+            return False
+        best = shape, trial
+        return True
+
+    for shape in shapes:
+        better(shape)
+    for _ in range(_REFINEMENTS if best else 0):
+        assert best is not None
+        finer = effect.refined(best[1].coefficients, best[0])
+        if finer == best[0] or not better(float(np.clip(finer, min(shapes), max(shapes)))):
+            break
     return best
 
 

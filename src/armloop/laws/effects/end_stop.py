@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from armloop.laws.effects.base import Context, Estimate, Parameter, number
+from armloop.laws.effects.base import Context, Estimate, Parameter
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
 
@@ -96,7 +96,5 @@ class LowerEndStop(_EndStop):
 
 def _sentence(stop: _EndStop, parameters: Mapping[str, Estimate], side: str) -> str:
     k, begins = parameters["stiffness"], parameters["begins"]
-    where = f"{number(begins.value):.3f} ± {number(begins.std_error):.2g} {begins.unit}"
-    return (
-        f"{side} {where} a stop pushes joint {stop.joint} back with {k.words()}; on the other side it is free"
-    )
+    back = f"a stop pushes joint {stop.joint} back with {k.words()}"
+    return f"{side} {begins.words(3)} {back}; on the other side it is free"
