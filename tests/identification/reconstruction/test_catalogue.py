@@ -103,20 +103,6 @@ def test_a_spring_is_found_in_the_training_data() -> None:
     check(found.model.effects[0], SPRING)
 
 
-def stopped(motion: Motion) -> Array:
-    return np.outer(5.0 * np.maximum(motion.q[:, 2] - 0.23, 0.0), [0, 0, 1])
-
-
-def test_a_stop_is_found_where_it_begins() -> None:
-    """Between the positions that are tried."""
-    found = made([stopped])
-    assert named(found) == [("upper_end_stop", 3, None)]
-    begins = found.model.effects[0].parameters["begins"]
-    assert begins.std_error < 0.02
-    assert abs(begins.value - 0.23) < 4 * begins.std_error
-    check(found.model.effects[0], {"stiffness": 5.0})
-
-
 def test_the_energies_find_it_too() -> None:
     assert named(made([coupled], library="lagrangian")) == [("transmission_coupling", 2, 3)]
 
