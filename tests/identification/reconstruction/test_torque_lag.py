@@ -115,15 +115,16 @@ def test_of_fast_logs_as_much_motion_is_looked_at_as_of_slow_ones(monkeypatch: p
 
 
 def test_both_corners_see_the_same_speed(monkeypatch: pytest.MonkeyPatch) -> None:
-    corners: list[tuple[float, float]] = []
+    corners: list[tuple[float, ...]] = []
 
     def own(logs: Any, arm: Any, how: Conditioning, aside: Any, seconds: float, felt_hz: float) -> TorqueLag:
-        corners.append((how.cutoff_hz, felt_hz))
+        corners.append((how.cutoff_hz, felt_hz, how.smear))
         return TorqueLag(0.01, 1e-4, np.full(3, 0.01))
 
     monkeypatch.setattr(torque_lags, "_found", own)
     found = torque_lag([recorded(1, DEAD)], three_axis(), Conditioning(8.0), [np.zeros((0, 2))], 2.0)
-    assert found.seconds == 0.01 and corners == [(8.0, 8.0), (4.0, 8.0)]
+    # what a joint that sticks shows before it moves is kept out twice as far below half the corner
+    assert found.seconds == 0.01 and corners == [(8.0, 8.0, 0.5), (4.0, 8.0, 1.0)]
 
 
 def test_held_out_blocks_take_no_part() -> None:

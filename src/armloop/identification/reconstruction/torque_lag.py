@@ -121,7 +121,8 @@ def torque_lag(
     found = _found(some, arm, how, left_out, block_seconds, how.cutoff_hz)
     if abs(found.seconds) * how.cutoff_hz < FELT or not found.clear:
         return replace(found, seconds=0.0)
-    slower = replace(how, cutoff_hz=how.cutoff_hz / _SLOWER)
+    # what a joint that sticks shows before it moves is a lead below any corner: it is kept out twice as far
+    slower = replace(how, cutoff_hz=how.cutoff_hz / _SLOWER, smear=2 * how.smear)
     # where v is late, it is as late below half the corner: the torque's own lag alone may differ
     slow = _found(some, arm, slower, left_out, block_seconds, how.cutoff_hz)
     allowed = max(_SURE * float(np.hypot(found.std_error, slow.std_error)), _ALIKE * abs(found.seconds))
