@@ -279,3 +279,49 @@ class TestSearch:
             monkeypatch.setattr(searching, "clear", clear)
             monkeypatch.setattr(searching, "pruned", pruned)
             assert self.found(search) == named
+
+
+class TestEffectsOfOneJoint:
+    """Searches that come to given effects, by what they are barred from, and what these leave."""
+
+    @staticmethod
+    def found(
+        monkeypatch: pytest.MonkeyPatch, outcomes: dict[str, tuple[str, float]]
+    ) -> tuple[str, list[str]]:
+        """What is found, and what each search was barred from; effects are letters, with the number of their joint."""
+        asked: list[str] = []
+
+        class Given:
+            def __init__(self, evidence: Any, progress: Any, panel: Any, barred: Any) -> None:
+                self.barred = " ".join(barred)
+
+            def outcome(self) -> Any:
+                asked.append(self.barred)
+                names, value = outcomes[self.barred]
+                effects = [
+                    SimpleNamespace(place=name, joint=int(name[1]) or None, label=lambda name=name: name)
+                    for name in names.split()
+                ]
+                return SimpleNamespace(
+                    names=names,
+                    found=[SimpleNamespace(effect=e) for e in effects],
+                    after=SimpleNamespace(score=value),
+                )
+
+        monkeypatch.setattr(searching, "_Search", Given)
+        monkeypatch.setattr(searching, "log_posterior", lambda evidence, score, effects: score)
+        anything: Any = None
+        made: Any = searching.search(anything, lambda text: None, panel=SimpleNamespace())  # type: ignore[arg-type]
+        return made.names, asked
+
+    def test_two_that_others_of_the_joint_are_likelier_than_give_way(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        given = {"": ("g1 s1", 5.0), "g1": ("c1 i1", 9.0), "s1": ("g1 c1", 6.0)}
+        assert self.found(monkeypatch, given) == ("c1 i1", ["", "g1", "s1"])
+        # not by less than the same effects are by, a little better shaped
+        given = {"": ("g1 s1", 5.0), "g1": ("c1 i1", 5.05), "s1": ("g1 c1", 4.0)}
+        assert self.found(monkeypatch, given)[0] == "g1 s1"
+        # of joints of their own, and of the whole arm, nothing is asked
+        for alone in ("g1 s2", "g1", "a0 b0"):
+            assert self.found(monkeypatch, {"": (alone, 5.0)}) == (alone, [""])

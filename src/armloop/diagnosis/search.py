@@ -6,6 +6,7 @@ gains nothing; before the run every hypothesis is as likely as any other, and th
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
@@ -57,7 +58,27 @@ def search(
         panel: who tries the hypotheses; in this process by default.
         barred: effects that are not asked about.
     """
-    return _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1), barred).outcome()
+    asked = panel or Hypotheses(evidence, jobs=1)
+    best = _Search(evidence, progress, asked, barred).outcome()
+    # One effect may lie between two of its joint that are there, as a gain does between inertia and friction, and be named
+    # with what mends it: no single step leads from there to the two.
+    for f in _of_one_joint(best.found):
+        progress(f"whether other effects do better than {f.effect.label()} with those of its joint")
+        other = _Search(evidence, progress, asked, [*barred, f.effect.place]).outcome()
+        if _value(evidence, other) > _value(evidence, best) + _LEAST:
+            best = other
+    return best
+
+
+def _of_one_joint(found: Sequence[Found]) -> list[Found]:
+    """Effects of a joint of which others were found, too."""
+    joints = Counter(f.effect.joint for f in found)
+    return [f for f in found if f.effect.joint is not None and joints[f.effect.joint] > 1]
+
+
+def _value(evidence: Evidence, outcome: Outcome) -> float:
+    """Log posterior of an outcome, but for a constant of the run."""
+    return log_posterior(evidence, outcome.after.score, [f.effect for f in outcome.found])
 
 
 def log_posterior(evidence: Evidence, score: Score, effects: Sequence[Effect]) -> float:
