@@ -157,7 +157,15 @@ def print_verdicts(cases: dict[str, Case]) -> int:
             wrong.append([name, truth, sizes, got])
     print(table(["case", "hidden", "size", "verdict"], wrong, "Not judged rightly"))
     met = True
-    targets = {"one": 0.95, "two": 0.85, "unlisted": 0.9, "event": 0.8, "carried": 0.8, "clean": 0.95}
+    targets = {
+        "one": 0.95,
+        "two": 0.85,
+        "unlisted": 0.9,
+        "event": 0.8,
+        "carried": 0.8,
+        "stop": 0.9,
+        "clean": 0.95,
+    }
     for kind, target in targets.items():
         mine = [case for case in cases.values() if case[0]["kind"] == kind]
         if not mine:

@@ -38,6 +38,8 @@ KINDS = (
     "external_contact",
     "external_torque",
 )
+#: Springs on one side, which are hidden in runs of their own.
+STOPS = ("upper_end_stop", "lower_end_stop")
 #: Parameters that are proportional to the torque of an effect.
 _LINEAR = {
     "payload": ("mass",),
@@ -49,6 +51,7 @@ _LINEAR = {
     "quadratic_drag": ("coefficient",),
     "friction_drift": ("level",),
     "joint_spring": ("stiffness",),
+    **dict.fromkeys(STOPS, ("stiffness",)),
     "torque_ripple": ("amplitude",),
     "presliding_hysteresis": ("level",),
     "transmission_coupling": ("inertia", "viscous", "coulomb"),
@@ -72,7 +75,7 @@ _LAWS: dict[str, Callable[[float, np.ndarray, np.ndarray, int, int], float]] = {
 
 @dataclass(frozen=True)
 class HiddenCase:
-    """What is hidden: ``one``, ``two``, ``clean``, ``unlisted``, ``event`` or ``carried``, effects, sizes, and words."""
+    """What is hidden: ``one``, ``two``, ``clean``, ``unlisted``, ``event``, ``carried``, ``stop``; effects, sizes, words."""
 
     kind: str
     effects: list[Effect] = field(default_factory=list)
@@ -111,7 +114,7 @@ def draw_case(arm: Any, reference: OutsideReference, seed: int, kind: str, size:
             load = _sized(arm, short, bare, _draw(arm, "payload", reference.seconds, rng) or {}, size)
         intervals = _cycles(reference.seconds, rng)
         return HiddenCase(kind, [{**load, "name": "carried_load", "intervals": intervals}], [size])
-    names = ("external_contact", "external_torque") if kind == "event" else KINDS[:-2]
+    names = {"event": ("external_contact", "external_torque"), "stop": STOPS}.get(kind, KINDS[:-2])
     effects: list[Effect] = []
     while len(effects) < (2 if kind == "two" else 1):
         effect = _draw(arm, str(rng.choice(names)), reference.seconds, rng)
@@ -206,6 +209,8 @@ def _draw(arm: Any, name: str, seconds: float, rng: Any) -> Effect | None:
         return {**e, "level": level, "time_constant": float(rng.uniform(0.2, 0.5) * seconds)}
     if name == "joint_spring":
         return {**e, "stiffness": level, "rest": float(rng.uniform(-0.5, 0.5) * link.reach)}
+    if name in STOPS:
+        return {**e, "stiffness": level, "begins": float(rng.uniform(-0.4, 0.4) * link.reach)}
     if name == "external_contact":
         long = float(np.exp(rng.uniform(np.log(0.3), np.log(3.0))))
         return {

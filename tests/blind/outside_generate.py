@@ -17,6 +17,8 @@ KINDS = ("clean", "one", "event", "one", "two", "one", "unlisted", "one")
 SIZES = (0.04, 0.08, 0.2)
 #: The same of runs in which a load is picked up and put down.
 LOADS = ("carried", "carried", "clean", "carried")
+#: The same of runs in which a joint meets a spring on one side.
+STOPS = ("stop", "stop", "clean", "stop")
 #: So often another effect is drawn where one throws the arm off its path.
 _ATTEMPTS = 5
 
@@ -30,12 +32,14 @@ def generate_outside(
     seconds: float = 30.0,
     points: bool = False,
     loads: bool = False,
+    stops: bool = False,
 ) -> None:
     """Write one arm's cases; joints (one of the numbers), sample rate, noise and controller are drawn from the seed, too.
 
     Args:
         points: the runs, not the training logs, go from point to point and dwell there.
         loads: what is hidden is a load that is carried in parts of a run.
+        stops: what is hidden is a spring on one side of a position.
     """
     rng = np.random.default_rng([seed, 0x0575])
     joints = int(rng.choice(numbers))
@@ -55,7 +59,7 @@ def generate_outside(
     for k, reference in enumerate(training):
         write_log(arm.simulate(reference, seed=1000 + k, **how), folder / f"baseline_{k + 1}.csv")
     for case in range(cases):
-        kinds = LOADS if loads else KINDS
+        kinds = LOADS if loads else STOPS if stops else KINDS
         kind, size = kinds[case % len(kinds)], SIZES[int(rng.integers(len(SIZES)))]
         speed = float(rng.uniform(0.6, 1.0))
         reference = (point_reference if points else fourier_reference)(

@@ -10,6 +10,7 @@ that is handed the path of the logs alone, and the answers are opened when all v
     python tests/blind/run.py --outside --arms 6       arms, engine and controllers from outside (MuJoCo)
     python tests/blind/run.py --outside --points   … in runs that pick and place, models from sines and sweeps
     python tests/blind/run.py --outside --loads    … in which a load is carried in parts of the runs
+    python tests/blind/run.py --outside --stops    … in which a joint meets a spring on one side of a position
     python tests/blind/run.py --measured ../shared/data   effects added to logs of three arms (--first 4, 7, …: others)
     python tests/blind/run.py --again DIR              diagnose kept logs once more
 """
@@ -99,6 +100,11 @@ def main() -> int:
         "--loads", action="store_true", help="with --outside: a load is carried in parts of the runs"
     )
     parser.add_argument(
+        "--stops",
+        action="store_true",
+        help="with --outside: a joint meets a spring on one side of a position",
+    )
+    parser.add_argument(
         "--measured",
         default=None,
         metavar="DATA",
@@ -123,7 +129,7 @@ def main() -> int:
         if not options.again:
             arms = options.arms if options.measured is None else min(options.arms, len(SOURCES))
             seeds = range(options.first, options.first + arms)
-            how = {"points": options.points, "loads": options.loads}
+            how = {"points": options.points, "loads": options.loads, "stops": options.stops}
             reasons = {seed: kept.get(["made", seed, options.cases]) for seed in seeds}
             made = {
                 s: workers.submit(make, s, options.cases, place, outside, how, options.measured)

@@ -212,6 +212,9 @@ class _Acting:
             data.qfrc_applied[j] -= e["coefficient"] * v * abs(v)
         elif name == "torque_ripple":
             data.qfrc_applied[j] -= e["amplitude"] * np.sin(e["order"] * data.qpos[j] + e["phase"])
+        elif name in ("upper_end_stop", "lower_end_stop"):
+            within = np.maximum if name == "upper_end_stop" else np.minimum
+            data.qfrc_applied[j] -= e["stiffness"] * within(data.qpos[j] - e["begins"], 0.0)
         elif name == "friction_asymmetry":
             # A dry friction of f + a forward and f - a backward is one of f beside a constant, at rest, too.
             data.qfrc_applied[j] -= e["level"]

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from armloop.data.dropouts import mended, mended_part
 from armloop.data.header import check_header, columns_of
 from armloop.data.plausibility import doubts, faults, is_time_series
-from armloop.data.rate_noise import rate_noise
+from armloop.data.rate_noise import central_differences, rate_noise
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import velocity_lag
 from armloop.data.stamps import bridged, coincident
@@ -208,9 +208,7 @@ class MotionLog:
         if not rate_noise(mended(self.record)).recorded_is_worse:
             return self
         rates = differentiated(self.time, self.q, self.name)
-        return unchecked_log(
-            **{**{f.name: getattr(self, f.name) for f in fields(self)}, "v": rates, "v_derived": True}
-        )
+        return unchecked_log(**{**vars(self), "v": rates, "v_derived": True})
 
     def runs(self) -> list[slice]:
         """Return the stretches without a gap as slices; never filter or differentiate across two of them."""
@@ -343,12 +341,8 @@ def differentiated(time: Array, q: Array, name: str) -> Array:
     """
     _check_shapes(time, q, name)
     _check_time(time, name, lambda row: f"row {row + 1}")
-    v, runs = np.zeros_like(q), _runs(time)
-    q = bridged(q, coincident(time, q, runs), time)
-    for run in runs:
-        if run.stop - run.start > 1:
-            v[run] = np.gradient(q[run], time[run], axis=0)
-    return v
+    runs = _runs(time)
+    return central_differences(time, bridged(q, coincident(time, q, runs), time), runs)
 
 
 def _side_by_side(columns: dict[str, Array], kinds: Mapping[str, list[str]]) -> dict[str, Array]:

@@ -7,6 +7,7 @@ an arm hardly moves, and what is there of a rate is noise.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -48,20 +49,28 @@ class RateNoise(NamedTuple):
         )
 
 
+def central_differences(time: Array, q: Array, runs: Sequence[slice]) -> Array:
+    """(N, n) rates of q within each run; a run of one sample has none."""
+    v = np.zeros_like(q)
+    for run in runs:
+        if run.stop - run.start > 1:
+            v[run] = np.gradient(q[run], time[run], axis=0)
+    return v
+
+
 @once
 def rate_noise(log: Recorded) -> RateNoise:
     """The noise of v and of q differentiated; of no joint where a log is too slow, or too short, to tell.
 
     The median keeps impacts and reversals out.
     """
-    both = np.hstack([log.v, np.zeros_like(log.q)])
+    both = np.hstack([log.v, central_differences(log.time, log.q, log.runs)])
     octave, slow, told = np.zeros_like(both), np.zeros_like(log.v), np.zeros(len(both), dtype=bool)
     n = log.v.shape[1]
     for run in log.runs:
         period = float(np.ptp(log.time[run])) / max(run.stop - run.start - 1, 1)
         if period * _CORNER * _SAMPLES > 1 or np.ptp(log.time[run]) * _CORNER < _SAMPLES:
             continue
-        both[run, n:] = np.gradient(log.q[run], log.time[run], axis=0)
         low = LowPass(_CORNER, period)(both[run])
         octave[run] = np.abs(LowPass(2 * _CORNER, period)(both[run]) - low)
         slow[run], told[run] = np.abs(low[:, n:]), True
