@@ -22,9 +22,13 @@ ANY_ARM: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
 
 
 class Named(str):
-    """An effect that is no more than its name, which ends in the number of its parameters."""
+    """An effect that is no more than its name, which ends in the number of its parameters; of joint 1 are w to z."""
 
-    joint = other_joint = None
+    other_joint = None
+
+    @property
+    def joint(self) -> int | None:
+        return 1 if self[0] in "wxyz" else None
 
     @property
     def place(self) -> tuple[str, None, None]:
@@ -90,6 +94,18 @@ class TestSearch:
     @staticmethod
     def found(search: Any) -> list[str]:
         return [str(f.effect) for f in search.outcome().found]
+
+    @pytest.mark.parametrize(("pair", "exchanged"), [("z1 w1", True), ("c1 d1", False), ("z1 d1", True)])
+    def test_two_of_a_joint_are_exchanged_for_two_between_which_one_lay(
+        self, pair: str, exchanged: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """From the first two no single step leads to the others; the first of these must be of the joint."""
+        first, second = pair.split()
+        left = {"": 900.0, "x1": 300.0, "x1 y1": 150.0, first: 600.0, second: 700.0, pair: 20.0}
+        assert self.found(self.search(monkeypatch, left)) == (pair.split() if exchanged else ["x1", "y1"])
+        # of two that are of no joint no other two are asked for
+        elsewhere = {key.replace("x1", "a1").replace("y1", "b1"): value for key, value in left.items()}
+        assert self.found(self.search(monkeypatch, elsewhere)) == ["a1", "b1"]
 
     def test_a_posterior_is_the_likelihood_and_the_odds(self, monkeypatch: pytest.MonkeyPatch) -> None:
         search = self.search(monkeypatch, {"": 900.0, "a1": 300.0, "b2": 300.0})
@@ -279,49 +295,3 @@ class TestSearch:
             monkeypatch.setattr(searching, "clear", clear)
             monkeypatch.setattr(searching, "pruned", pruned)
             assert self.found(search) == named
-
-
-class TestEffectsOfOneJoint:
-    """Searches that come to given effects, by what they are barred from, and what these leave."""
-
-    @staticmethod
-    def found(
-        monkeypatch: pytest.MonkeyPatch, outcomes: dict[str, tuple[str, float]]
-    ) -> tuple[str, list[str]]:
-        """What is found, and what each search was barred from; effects are letters, with the number of their joint."""
-        asked: list[str] = []
-
-        class Given:
-            def __init__(self, evidence: Any, progress: Any, panel: Any, barred: Any) -> None:
-                self.barred = " ".join(barred)
-
-            def outcome(self) -> Any:
-                asked.append(self.barred)
-                names, value = outcomes[self.barred]
-                effects = [
-                    SimpleNamespace(place=name, joint=int(name[1]) or None, label=lambda name=name: name)
-                    for name in names.split()
-                ]
-                return SimpleNamespace(
-                    names=names,
-                    found=[SimpleNamespace(effect=e) for e in effects],
-                    after=SimpleNamespace(score=value),
-                )
-
-        monkeypatch.setattr(searching, "_Search", Given)
-        monkeypatch.setattr(searching, "log_posterior", lambda evidence, score, effects: score)
-        anything: Any = None
-        made: Any = searching.search(anything, lambda text: None, panel=SimpleNamespace())  # type: ignore[arg-type]
-        return made.names, asked
-
-    def test_two_that_others_of_the_joint_are_likelier_than_give_way(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        given = {"": ("g1 s1", 5.0), "g1": ("c1 i1", 9.0), "s1": ("g1 c1", 6.0)}
-        assert self.found(monkeypatch, given) == ("c1 i1", ["", "g1", "s1"])
-        # not by less than the same effects are by, a little better shaped
-        given = {"": ("g1 s1", 5.0), "g1": ("c1 i1", 5.05), "s1": ("g1 c1", 4.0)}
-        assert self.found(monkeypatch, given)[0] == "g1 s1"
-        # of joints of their own, and of the whole arm, nothing is asked
-        for alone in ("g1 s2", "g1", "a0 b0"):
-            assert self.found(monkeypatch, {"": (alone, 5.0)}) == (alone, [""])

@@ -6,9 +6,9 @@ gains nothing; before the run every hypothesis is as likely as any other, and th
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain, combinations
 
 import numpy as np
 
@@ -40,7 +40,7 @@ ALTERNATIVE = 0.05
 MOST_EFFECTS = 4
 #: Log posteriors that differ by less are the same: the same effects, one a little better shaped beside the others.
 _LEAST = 0.1
-#: Of so many effects, the likeliest, is each asked with a second one beside it.
+#: Of so many effects, the likeliest, is each asked with a second one beside it, or in the place of two.
 _FIRST = 3
 #: What depends on one another is found, or designed, in turn so many times.
 ROUNDS = 2
@@ -58,27 +58,7 @@ def search(
         panel: who tries the hypotheses; in this process by default.
         barred: effects that are not asked about.
     """
-    asked = panel or Hypotheses(evidence, jobs=1)
-    best = _Search(evidence, progress, asked, barred).outcome()
-    # One effect may lie between two of its joint that are there, as a gain does between inertia and friction, and be named
-    # with what mends it: no single step leads from there to the two.
-    for f in _of_one_joint(best.found):
-        progress(f"whether other effects do better than {f.effect.label()} with those of its joint")
-        other = _Search(evidence, progress, asked, [*barred, f.effect.place]).outcome()
-        if _value(evidence, other) > _value(evidence, best) + _LEAST:
-            best = other
-    return best
-
-
-def _of_one_joint(found: Sequence[Found]) -> list[Found]:
-    """Effects of a joint of which others were found, too."""
-    joints = Counter(f.effect.joint for f in found)
-    return [f for f in found if f.effect.joint is not None and joints[f.effect.joint] > 1]
-
-
-def _value(evidence: Evidence, outcome: Outcome) -> float:
-    """Log posterior of an outcome, but for a constant of the run."""
-    return log_posterior(evidence, outcome.after.score, [f.effect for f in outcome.found])
+    return _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1), barred).outcome()
 
 
 def log_posterior(evidence: Evidence, score: Score, effects: Sequence[Effect]) -> float:
@@ -115,7 +95,8 @@ class _Search:
         while True:
             best, others = max(self._steps(found), key=lambda step: step[0], default=(value, found))
             if best <= value + _LEAST:
-                best, others = max(self._pairs(found), key=lambda step: step[0], default=(value, found))
+                further = chain(self._pairs(found), self._exchanges(found))
+                best, others = max(further, key=lambda step: step[0], default=(value, found))
             if best <= value + _LEAST:
                 break
             found, value = others, best
@@ -184,6 +165,25 @@ class _Search:
         more = sorted(self._additions(found), key=lambda step: -step[0])
         for _, first in more[:_FIRST]:
             yield from self._additions(first)
+
+    def _exchanges(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
+        """Sets with two others in the place of two of a joint.
+
+        One effect may lie between two that are there, as a gain does between inertia and friction, and be found with what
+        mends it: no single step leads from there to the two.
+        """
+        for pair in combinations(found, 2):
+            joint, places = pair[0].effect.joint, {f.effect.place for f in pair}
+            if joint is None or joint != pair[1].effect.joint:
+                continue
+            others = [f for f in found if f not in pair]
+            firsts = [
+                step
+                for step in self._additions(others)
+                if (new := step[1][-1].effect).joint == joint and new.place not in places
+            ]
+            for _, first in sorted(firsts, key=lambda step: -step[0])[:_FIRST]:
+                yield from self._additions(first)
 
     def _additions(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """Sets with one effect more, with their log posteriors."""
