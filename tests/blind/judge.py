@@ -240,7 +240,7 @@ def _by_effect(cases: dict[str, Case]) -> str:
 def _parameters(cases: dict[str, Case]) -> str:
     found: dict[str, list[tuple[float, float]]] = {}
     for hidden, verdict in cases.values():
-        if hidden["kind"] in ("one", "two", "carried") and min(hidden["sizes"]) >= LARGE:
+        if hidden["kind"] in ("one", "two", "carried", "stop") and min(hidden["sizes"]) >= LARGE:
             for key, relative, standard in deviations(hidden, verdict):
                 found.setdefault(key, []).append((relative, standard))
     rows = []

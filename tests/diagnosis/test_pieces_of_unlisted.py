@@ -109,6 +109,19 @@ class TestLawThatIsNotListed:
         assert not simpler(0.0, 3, "v2^3")  # not fewer
         assert simpler(0.0, 1, "v2^3") and not simpler(0.0, 1, "sign(v2)")  # dry friction is listed
 
+        def far(energy: float, terms: int, form: str = "v2^3") -> bool:
+            law = unlisted.Law([(1.0, form)] * terms, np.full(rows, np.sqrt(energy / rows)), block)
+            return unlisted._is_far_likelier(evidence, law, with_effects, bare, 1)
+
+        # of however many parameters it must be likelier, and surely leave less than half of what is above the baseline
+        assert not far(0.0, 3)
+        monkeypatch.setattr(unlisted, "lead", lambda worse, better: 9.0)
+        needed = 3 * np.log(2 * len(own)) - np.log(len(hypotheses(arm))) - LOG_ODDS
+        same, half = (left + rows) / np.exp(needed / 10) - rows, (left + rows) / 2
+        assert 0 < same < half
+        assert far(same - 1, 3) and not far(same + 1, 3) and far(half - 1, 1) and not far(half + 1, 1)
+        assert not far(0.0, 0) and not far(0.0, 1, "sign(v2)")
+
     def test_what_was_named_at_a_joint_is_asked_even_if_it_leaves_what_the_baseline_does(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -6,7 +6,13 @@ from armloop.laws.effects import EFFECTS, Estimate, Law, Parameter, effect
 
 FAULTS = {
     "torque_gain": (2, "gain", 1.25, "1", ["Divide the torque readings of joint 2 by 1.25", "0.8 times"]),
-    "torque_offset": (1, "offset", -0.4, "N*m", ["Subtract -0.4 N*m from the torque readings of joint 1"]),
+    "torque_offset": (
+        1,
+        "offset",
+        -0.4,
+        "N*m",
+        ["Subtract -0.4 N*m from the torque readings of joint 1", "it must command -0.4 N*m in addition"],
+    ),
     "encoder_offset": (
         3,
         "offset",
