@@ -1,7 +1,5 @@
 """The stop operator against its law, sample by sample, and its limiting cases."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -65,17 +63,6 @@ def test_a_closed_path_dissipates_and_never_gives_energy():
     last_turn = slice(4000, 6001)
     work = float(np.sum(0.5 * (z[last_turn][1:] + z[last_turn][:-1]) * np.diff(q[last_turn])))
     assert work == pytest.approx(4 * 0.1 - 4 * 0.01, rel=1e-2)  # area of the loop of a stop
-
-
-def test_a_long_log_takes_a_moment():
-    q = np.random.default_rng(1).normal(size=(100_000, 6)).cumsum(axis=0)
-    begin = time.perf_counter()
-    stop_operator(q, 1.0)
-    fast = time.perf_counter() - begin
-    begin = time.perf_counter()
-    sample_by_sample(q[:2000], 1.0, [0])
-    slow = 50 * (time.perf_counter() - begin)
-    assert fast < 0.5 * slow
 
 
 @pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf])
