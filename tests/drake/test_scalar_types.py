@@ -218,12 +218,12 @@ def test_every_effect_but_the_sensors_has_a_system():
     ),
 )
 def test_an_effect_says_what_its_columns_say(name):
-    joint = 2 if EFFECTS[name].joint_wise else None
+    joint, other = 2 if EFFECTS[name].joint_wise else None, 3 if EFFECTS[name].pair_wise else None
     inertial = model_of(ARM).inertial_parameters()
-    law = effect_law(ARM, name, joint, PARAMETERS[name], MATH, inertial)
+    law = effect_law(ARM, name, joint, PARAMETERS[name], MATH, inertial, other)
     motion = random_motion(3, 4, seed=9)
     context = Context(ARM, motion, inertial)
-    expected = EFFECTS[name](joint).torque(context, PARAMETERS[name])
+    expected = EFFECTS[name](joint, other).torque(context, PARAMETERS[name])
     for k in range(motion.samples):
         q, v, vdot = (x[k].tolist() for x in (motion.q, motion.v, motion.vdot))
         tau = law.equations.torque(q, v, vdot) if law.equations else [0.0] * 3

@@ -38,6 +38,7 @@ def test_the_columns_of_every_log_are_the_same(model: ReconstructedModel) -> Non
     assert {"payload", "viscous_friction", "coulomb_friction", "gravity_tilt", "time_delay"} <= names
     assert "friction_drift" not in names  # it has memory
     assert not {"upper_end_stop", "lower_end_stop"} & names  # beyond what was met while learning
+    assert "coupling_spring" not in names
 
 
 def test_an_arm_with_a_sliding_joint_is_watched_without_what_it_cannot_have(

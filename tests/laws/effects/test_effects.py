@@ -394,6 +394,7 @@ def test_units_are_those_of_the_joint():
         ("joint_spring", "stiffness", "N*m/rad", "N/m"),
         ("joint_spring", "rest", "rad", "m"),
         ("upper_end_stop", "begins", "rad", "m"),
+        ("coupling_spring", "stiffness", "N*m/rad", "N/m"),
         ("torque_offset", "offset", "N*m", "N"),
         ("rotor_inertia", "inertia", "kg*m^2", "kg"),
     ):

@@ -20,7 +20,7 @@ from armloop.robot.kinematics import nominal_parameters
 FREE = {
     **dict.fromkeys(("friction_drift", "joint_spring", "stribeck_friction", "gravity_tilt"), 2),
     **dict.fromkeys(("upper_end_stop", "lower_end_stop"), 2),
-    **dict.fromkeys(("presliding_hysteresis", "torque_ripple", "external_contact"), 3),
+    **dict.fromkeys(("presliding_hysteresis", "torque_ripple", "external_contact", "coupling_spring"), 3),
     "transmission_coupling": 4,
     "payload": 5,
 }
@@ -34,7 +34,8 @@ def test_what_a_law_costs_and_what_it_is_made_of() -> None:
 
     assert those("event") == {"external_contact", "external_torque"}
     assert those("searched") == set(STATED) - those("event")
-    assert those("load") == {"payload", "joint_spring", "gravity_tilt", "upper_end_stop", "lower_end_stop"}
+    springs = {"joint_spring", "coupling_spring", "upper_end_stop", "lower_end_stop"}
+    assert those("load") == {"payload", "gravity_tilt", *springs}
     assert those("memory") == {*those("event"), "presliding_hysteresis", "friction_drift"}
     assert those("needs_inertial") == {"gravity_tilt"}
     of_model = {

@@ -21,13 +21,13 @@ KINDS = {
     "of_time": "friction_drift",
     "sensor": "encoder_offset time_delay torque_gain torque_offset",
     "event": "external_contact external_torque",
-    "pair_wise": "transmission_coupling",
+    "pair_wise": "coupling_spring transmission_coupling",
 }
 #: Parameters that a run determines; an event's interval is none of them.
 COMPLEXITY = {
     **dict.fromkeys(("friction_drift", "joint_spring", "stribeck_friction", "gravity_tilt"), 2),
     **dict.fromkeys(("upper_end_stop", "lower_end_stop"), 2),
-    **dict.fromkeys(("presliding_hysteresis", "torque_ripple", "external_contact"), 3),
+    **dict.fromkeys(("presliding_hysteresis", "torque_ripple", "external_contact", "coupling_spring"), 3),
     "transmission_coupling": 4,
     "payload": 5,
 }

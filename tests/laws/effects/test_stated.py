@@ -333,6 +333,7 @@ def test_a_law_found_belongs_to_arms_of_as_many_joints() -> None:
 #: Numbers that no arm has below zero, and such as are above zero.
 LEAST = {
     "coulomb_friction": ("level",),
+    "coupling_spring": ("stiffness",),
     "external_contact": ("start",),
     "external_torque": ("start",),
     "friction_drift": ("level",),

@@ -165,7 +165,8 @@ class Effect(ABC):
         load: whether its torque passes the joint's bearings and gears, so that friction grows with it.
         memory: whether it depends on the path or the time, not only on q, v and vdot.
         of_time: whether it depends on the time since the start of a run; to a controller the start is long ago.
-        watched: whether a watch of an arm in operation keeps its columns: not where they are nothing over much of a motion.
+        watched: whether a watch of an arm in operation keeps its columns: not where they are nothing over much of a
+            motion, or too many to be kept of every pair of joints.
         simulated: whether Drake's systems can have it; else it is found in logs alone.
         passive: whether each of its coefficients is an inertia, or dissipates on its own, so that it is negative for no arm.
         rubs: whether it is friction of one joint and nothing else, as the friction selection of a reconstruction has it.
