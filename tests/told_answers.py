@@ -89,7 +89,7 @@ class Answers:
                 "plain", (evidence.name, list(among)), outcome
             ),
             "strongest_first": lambda evidence, outcome: self.note("ordered", evidence.name, outcome),
-            "without_law": lambda evidence, law: evidence,
+            "without_laws": lambda evidence, laws: evidence,
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
         parts["of_too_few_logs"] = lambda model, found: self.given.get("of_too_few_logs", [])
@@ -139,7 +139,7 @@ class Answers:
             contacts=contacts,
             evidence=self.account,
             outcome=self.outcome("account"),
-            unlisted=self.given["unlisted"],
+            laws=[] if self.given["unlisted"] is None else [self.given["unlisted"]],
             without_effect=lambda outcome: SimpleNamespace(contacts=contacts[:1]),
         )
 
@@ -148,7 +148,7 @@ class Answers:
         if not self.given["carried"]:
             return None
         evidence, outcome = Evidence(name="loaded", rows=ROWS.copy()), self.outcome("with the load")
-        return SimpleNamespace(contacts=[], unlisted=None, evidence=evidence, outcome=outcome)
+        return SimpleNamespace(contacts=[], laws=[], evidence=evidence, outcome=outcome)
 
     def reversals(self, evidence: Evidence, outcome: Any, kept: Any, progress: Any) -> Any:
         self.asked["kept"] = kept

@@ -168,15 +168,21 @@ def test_the_search_is_made_anew_while_the_torque_is_later_than_was_left_out(
     monkeypatch.setattr(
         accounts, "find_law", lambda evidence, outcome, progress: (f"law of {evidence}", outcome)
     )
+    further: list[Any] = []
+    monkeypatch.setattr(
+        accounts, "further_laws", lambda *given: further.append(given[:3]) or [f"beside {given[2]}"]
+    )
     asked: list[Any] = []
     monkeypatch.setattr(Account, "_or_listed", lambda account, first, *given: asked.append(first) or account)
     whole: Any = SimpleNamespace(unknown="known" if known else None)
     contact: Any = "contact"
     found = Account.of(whole, [contact], lambda text: None)
     searches, final = len(late), ("later", reach) if reach else whole
+    final_evidence: Any = (final, 1)
     assert found.whole == final and found.outcome == searches and made[-1] == (final, 1)  # type: ignore[comparison-overlap]
     assert found.unlisted == f"law of {(final, 1)}" and len(made) == searches  # type: ignore[comparison-overlap]
-    assert asked == [searches]
+    assert asked == [searches] and further == [(final_evidence, searches, f"law of {final_evidence}")]
+    assert found.laws == [f"law of {final_evidence}", f"beside law of {final_evidence}"]
 
 
 def test_without_an_effect_those_events_stay_that_are_one_without_it_too(

@@ -247,10 +247,12 @@ def test_an_account_is_as_likely_as_its_effects_events_and_law_allow(monkeypatch
         evidence=None,
         outcome=SimpleNamespace(after=SimpleNamespace(effects=["friction"])),
         contacts=[SimpleNamespace(added=SimpleNamespace(effect="push"))],
-        unlisted=None,
+        laws=[],
         everywhere=lambda residual, rows: -1.0,
     )
     nothing: Any = None
     assert onset._posterior(given, nothing, nothing) == -21.0
-    given.unlisted = law
+    given.laws = [law]
     assert onset._posterior(given, nothing, nothing) == -21.0 - 202.0
+    given.laws = [law, SimpleNamespace(joint=1, parameters={"v1": 1.0})]
+    assert onset._posterior(given, nothing, nothing) == -21.0 - 302.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +25,7 @@ from armloop.diagnosis.outcomes import Outcome, without_effects_at
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import search
 from armloop.diagnosis.trials import Hypotheses, Known
-from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.diagnosis.unlisted import Unlisted, find_law, further_laws
 from armloop.laws.effects import Effect
 from armloop.laws.effects.base import number
 from armloop.laws.effects.found import RANGE
@@ -45,7 +46,8 @@ class Account:
         contacts: events, kept out of the search.
         evidence: the run without them.
         outcome: effects found.
-        unlisted: a real residual that they leave, if there is one.
+        unlisted: the largest real residual that they leave, if there is one.
+        further: laws of what is left of other joints beside it.
     """
 
     whole: Evidence
@@ -53,6 +55,12 @@ class Account:
     evidence: Evidence
     outcome: Outcome
     unlisted: Unlisted | None
+    further: Sequence[Unlisted] = ()
+
+    @property
+    def laws(self) -> list[Unlisted]:
+        """Residuals that no listed effect explains, the largest first."""
+        return [] if self.unlisted is None else [self.unlisted, *self.further]
 
     @staticmethod
     def of(
@@ -70,7 +78,8 @@ class Account:
             evidence = without(whole, contacts)
             outcome = search(evidence, progress, panel)
         unlisted, kept = find_law(evidence, outcome, progress)
-        account = Account(whole, contacts, evidence, kept, unlisted)
+        further = [] if unlisted is None else further_laws(evidence, kept, unlisted, progress)
+        account = Account(whole, contacts, evidence, kept, unlisted, further)
         return account._or_listed(outcome, progress, panel)
 
     def _or_listed(self, first: Outcome, progress: Progress, panel: Hypotheses | None) -> Account:
@@ -94,7 +103,7 @@ class Account:
         law, outcome = find_law(evidence, again, progress)
         if law is not None:
             return self
-        other = replace(self, outcome=outcome, unlisted=None)
+        other = replace(self, outcome=outcome, unlisted=None, further=())
         mine, others = self.score(evidence.rows), other.score(evidence.rows)
         if self.unlisted is not None:
             return other if lead(others, mine) <= CHANCE else self
@@ -109,8 +118,8 @@ class Account:
     def remaining(self) -> Array:
         """(N, n) residual of the model with effects and law, N·m (N); the law is tried beyond its range, too."""
         added = self.outcome.added()
-        if self.unlisted is not None:
-            for law in self.unlisted.added():
+        for each in self.laws:
+            for law in each.added():
                 everywhere = {key: e for key, e in law.parameters.items() if key not in RANGE}
                 added.append(replace(law, parameters=everywhere))
         model = self.whole.model.with_effects(added)
@@ -159,8 +168,8 @@ class Account:
     def _held_out(self) -> Array:
         """(R,) what effects and law leave of every row, weighted."""
         held_out = self.outcome.after.held_out.copy()
-        if self.unlisted is not None:
-            held_out[self.outcome.after.stacked.joint == self.unlisted.joint - 1] = self.unlisted.left
+        for law in self.laws:
+            held_out[self.outcome.after.stacked.joint == law.joint - 1] = law.left
         return held_out
 
     def score(self, rows: Mask) -> Score:
@@ -268,8 +277,8 @@ def best_account(
         account = Account.of(whole, again, progress, panel)
         # Beside what only looked like an event, a search may go another way than without it.
         if not again and looked.left(residual) < account.left(residual):
-            law = looked.unlisted
-            return looked if law is None else replace(looked, unlisted=law.over(whole))
+            laws = [law.over(whole) for law in looked.laws]
+            return replace(looked, unlisted=laws[0], further=laws[1:]) if laws else looked
     if not account.contacts:
         return account
     if contacts:

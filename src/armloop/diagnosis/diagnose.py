@@ -47,7 +47,7 @@ from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.score import mean_by_joint, ratio
 from armloop.diagnosis.suspected import suspected
 from armloop.diagnosis.trials import Hypotheses
-from armloop.diagnosis.unlisted import Unlisted, without_law
+from armloop.diagnosis.unlisted import Unlisted, without_laws
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.diagnosis.zeros import sentences, settled
 from armloop.identification.validation.misrecorded import misrecorded
@@ -73,15 +73,16 @@ class Diagnosis:
         verdict: ``no_effect``, ``effects_found``, ``unlisted_effect`` or ``cannot_tell``.
         outcome: the search's result.
         model: the model with the effects found.
-        unlisted: the law of a residual that no listed effect explains, if there is such a residual.
+        unlisted: the law of the largest residual that no listed effect explains, if there is such a residual.
         contacts: events of the run, found before the search and kept out of it.
         evidence: the run as it was judged; reversals are among its rows only if something was found there.
         sliding: (N, n) samples of the evidence that are no reversals.
         reversals: what was found at reversals, if anything.
         strengths: of each effect found.
-        adopted: whether the model has the unlisted law.
+        adopted: whether the model has the unlisted laws.
         standing: how far the run can be judged: what a reader must know beside the verdict.
         zeros: (L, n) encoder zeros of the logs, rad (m), that were taken off before they were judged.
+        further: laws of what is left of other joints beside the unlisted one.
     """
 
     verdict: str
@@ -96,14 +97,20 @@ class Diagnosis:
     strengths: list[Strength] = field(default_factory=list)
     adopted: bool = False
     zeros: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    further: Sequence[Unlisted] = ()
+
+    @property
+    def laws(self) -> list[Unlisted]:
+        """Residuals that no listed effect explains, with their laws, the largest first."""
+        return [] if self.unlisted is None else [self.unlisted, *self.further]
 
     def adopt(self) -> Diagnosis:
-        """The same with an unlisted law, where one was found, in the model: its feedforward supplies it.
+        """The same with the unlisted laws, where any were found, in the model: its feedforward supplies them.
 
-        The law acts where the run has been and fades outside of it (:class:`armloop.laws.effects.FoundLaw`).
+        A law acts where the run has been and fades outside of it (:class:`armloop.laws.effects.FoundLaw`).
         """
-        law = [] if self.unlisted is None or self.adopted else self.unlisted.added()
-        return replace(self, model=self.model.with_effects(law), adopted=True) if law else self
+        added = [] if self.adopted else [each for law in self.laws for each in law.added()]
+        return replace(self, model=self.model.with_effects(added), adopted=True) if added else self
 
     @property
     def reasons(self) -> list[str]:
@@ -142,8 +149,8 @@ class Diagnosis:
                 self.outcome.after.held_out * scale[self.outcome.before.stacked.joint],
             )
         )
-        if self.adopted and self.unlisted is not None:
-            after[self.unlisted.joint - 1] = self.unlisted.rmse_with_form
+        for law in self.laws if self.adopted else []:
+            after[law.joint - 1] = law.rmse_with_form
         return {
             "metric": "rmse",
             "held_out": True,
@@ -199,15 +206,15 @@ class Diagnosis:
             }
             for contact in self.contacts
         ]
-        if self.unlisted is not None:
-            where = whereabouts(self.evidence, self.outcome.after, self.unlisted.joint - 1)
+        for law in self.laws:
+            where = whereabouts(self.evidence, self.outcome.after, law.joint - 1)
             entry = {
                 "when": "changed",
                 "probability": probability.UNLISTED.probability,
                 "where": where.to_dict(),
                 "adopted": self.adopted,
             }
-            effects.append({**self.unlisted.to_dict(), **entry})
+            effects.append({**law.to_dict(), **entry})
         return {
             "schema": SCHEMA,
             "verdict": self.verdict,
@@ -344,14 +351,13 @@ def _by_events_alone(whole: Evidence, contacts: list[Contact], untold: list[Cont
 def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnosis:
     """The verdict that an account comes to, once reversals are judged, and what an unknown rest outweighs is taken back."""
     model, evidence, outcome = whole.model, account.evidence, account.outcome
-    contacts, unlisted, sliding = account.contacts, account.unlisted, evidence.rows
+    contacts, laws, sliding = account.contacts, account.laws, evidence.rows
     kept = without(whole.only(np.ones_like(whole.rows)), contacts).rows
-    if unlisted is not None:
-        kept[:, unlisted.joint - 1] = False
+    kept[:, [law.joint - 1 for law in laws]] = False
     turned = judge_reversals(evidence, outcome, kept, progress)
     if turned is not None:
         outcome, evidence = turned.outcome, turned.evidence
-    bare = without_law(evidence, unlisted)
+    bare = without_laws(evidence, laws)
     if bare is evidence:
         outcome = useful(evidence, outcome)
     else:
@@ -359,8 +365,8 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     searched = [f for f in outcome.found if turned is None or f not in turned.found]
     outcome = strongest_first(evidence, plainest(evidence, outcome, searched))
     progress("how far the run can be judged")
-    known = [] if unlisted is None else [unlisted.joint]
-    doubted = [unlisted.instead] if unlisted is not None and unlisted.instead else []
+    known = [law.joint for law in laws]
+    doubted = [law.instead for law in laws if law.instead]
     while True:
         fitted = beside = outcome
         if bare is not evidence:
@@ -371,19 +377,21 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
         augmented = model.with_effects([*fitted.added(), *(contact.added for contact in contacts)])
         named = bool(outcome.found or contacts)
         found = Diagnosis(
-            "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect",
+            "effects_found" if named else "unlisted_effect" if laws else "no_effect",
             fitted,
             augmented,
-            unlisted,
+            laws[0] if laws else None,
             evidence,
             contacts,
             sliding,
             turned,
             strengths=strengths(bare, beside),
+            further=laws[1:],
         )
-        if unlisted is not None and bare is not evidence:
-            rmse = found.errors()["after"][unlisted.joint - 1]
-            found = replace(found, unlisted=replace(unlisted, rmse=rmse))
+        if bare is not evidence:
+            rmse = found.errors()["after"]
+            stated = [replace(law, rmse=rmse[law.joint - 1]) for law in laws]
+            found = replace(found, unlisted=stated[0], further=stated[1:])
         # a law accounts for what it removes, adopted or not
         left = replace(found, adopted=True).errors()["after"]
         stand = standing(evidence.only(sliding), augmented, left, known)
@@ -395,7 +403,7 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             contacts = account.without_effect(outcome).contacts
             continue
         # a residual without a law is all there, though the verdict names it
-        rest = stand.left if unlisted is None or unlisted.parameters else (*stand.left, unlisted.joint - 1)
+        rest = (*stand.left, *(law.joint - 1 for law in laws if not law.parameters))
         slides = evidence.only(sliding)
         drowning = [each for each in contacts if drowned(slides, augmented, each, rest)]
         if not drowning:
@@ -405,7 +413,7 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     doubted += masked(
         [f.effect.label() for f, _ in outcome.masked if _is_left(f.effect, outcome, stand.left)]
     )
-    if unlisted is None and turned is None:
+    if not laws and turned is None:
         unsaid = sorted(set(stand.left) - {j for f, _ in outcome.masked for j in f.effect.indices})
         doubted += [
             too_little(each.effect.label(), each.joints, each.share, each.small, each.errors)

@@ -107,8 +107,8 @@ def _asked(account: Account) -> Mask:
     joints = np.asarray(after.score.energy > enough(account.evidence, after.score))
     if account.contacts:
         joints[:] = True
-    if account.unlisted is not None:
-        joints[account.unlisted.joint - 1] = True
+    for law in account.laws:
+        joints[law.joint - 1] = True
     for effect in after.effects:
         if effect.of_time:
             joints[list(effect.indices) or slice(None)] = True
@@ -189,9 +189,8 @@ def _posterior(account: Account, residual: Array, rows: Mask) -> float:
     evidence = account.evidence
     effects = [*account.outcome.after.effects, *(contact.added.effect for contact in account.contacts)]
     value = told(account.everywhere(residual, rows)) + price(evidence, effects)
-    if account.unlisted is not None:
-        terms = account.unlisted.parameters.keys() - set(RANGE)
-        value += law_log_prior(evidence, terms, account.unlisted.joint - 1)
+    for law in account.laws:
+        value += law_log_prior(evidence, law.parameters.keys() - set(RANGE), law.joint - 1)
     return value
 
 

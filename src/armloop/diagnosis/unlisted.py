@@ -28,7 +28,7 @@ from armloop.diagnosis.judgement import (
 )
 from armloop.diagnosis.lasting import FEWEST, lasting
 from armloop.diagnosis.law_selection import Law, LawSelection, law_left, library_of, names_of
-from armloop.diagnosis.outcomes import Found, Outcome, pruned, with_effects, without_effects_at
+from armloop.diagnosis.outcomes import Found, Outcome, pruned, refitted, with_effects, without_effects_at
 from armloop.diagnosis.reasons import part_of_a_law
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import log_prior, told
@@ -124,7 +124,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
     if listed:
         kept = pruned(evidence, bare)
         stated = _stated(evidence, with_effects(evidence, kept, listed), split, j)
-        return stated, with_effects(without_law(evidence, stated), kept, listed)
+        return stated, with_effects(without_laws(evidence, [stated]), kept, listed)
     if len(bare.found) < len(outcome.found):
         if _is_simpler(evidence, simpler, outcome, bare, j) or (
             not law.terms and _is_far_likelier(evidence, simpler, outcome, bare, j)
@@ -304,22 +304,43 @@ def _parameters(evidence: Evidence, law: Law, j: int) -> dict[str, Estimate]:
     return found_law(evidence.model.arm, j + 1, terms, low, high)
 
 
-def without_law(evidence: Evidence, law: Unlisted | None) -> Evidence:
-    """The run without the torque of a law, in which the effects beside it are judged."""
-    if law is None or not law.parameters:
+def further_laws(evidence: Evidence, outcome: Outcome, first: Unlisted, progress: Progress) -> list[Unlisted]:
+    """Laws of what is left of other joints beside the largest residual: what acts between joints acts on each of them.
+
+    Of each the residual must be real, and its law likelier than none. What a listed effect of the joint would be is not
+    asked: the search has asked it.
+    """
+    laws, asked = [first], {first.joint - 1}
+    while True:
+        bare = without_laws(evidence, laws)
+        beside = outcome if bare is evidence else refitted(bare, outcome)
+        j = _left_over(bare, beside, asked)
+        if j is None:
+            return laws[1:]
+        progress(f"joint {j + 1}: its law beside that of joint {first.joint}")
+        asked.add(j)
+        law = law_left(bare, beside.after, j)
+        if law.terms and not law.is_listed(j) and _is_likelier(bare, law, beside.after.score, [], j):
+            laws.append(_stated(bare, beside, law, j))
+
+
+def without_laws(evidence: Evidence, laws: Sequence[Unlisted]) -> Evidence:
+    """The run without the torque of laws, in which the effects beside them are judged."""
+    added = [each for law in laws for each in law.added()]
+    if not added:
         return evidence
     samples = evidence.samples
     context = evidence.model.context(samples.motion)
-    torque = np.sum([added.torque(context) for added in law.added()], axis=0)
+    torque = np.sum([each.torque(context) for each in added], axis=0)
     return replace(evidence, samples=replace(samples, tau=samples.tau - smooth(samples, torque)))
 
 
-def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
-    """The joint (0-based) with the largest residual that is real."""
+def _left_over(evidence: Evidence, outcome: Outcome, but: Collection[int] = ()) -> int | None:
+    """The joint (0-based), but for some, with the largest residual that is real."""
     before, after = outcome.before, outcome.after
     n = evidence.samples.motion.joints
     ratios = np.zeros(n)
-    for j in range(n):
+    for j in set(range(n)) - set(but):
         mine = after.stacked.joint == j
         if mine.sum() < FEWEST or after.score.energy[j] < REMAINDER * before.score.energy[j]:
             continue

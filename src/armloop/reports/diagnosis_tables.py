@@ -38,9 +38,9 @@ def effects_table(diagnosis: Diagnosis) -> Table:
         onset = found.effect.onset
         if onset is not None:
             rows.append(["", onset.word, with_error(onset.time, onset.error), "s", "", "", ""])
-    if diagnosis.unlisted is not None:
-        label = f"unlisted, joint {diagnosis.unlisted.joint}"
-        terms = [(k, e) for k, e in diagnosis.unlisted.parameters.items() if k not in RANGE]
+    for law in diagnosis.laws:
+        label = f"unlisted, joint {law.joint}"
+        terms = [(k, e) for k, e in law.parameters.items() if k not in RANGE]
         for k, (key, e) in enumerate(terms):
             likely = "" if k else percent(probability.UNLISTED.probability)
             rows.append(

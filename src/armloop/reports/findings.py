@@ -11,6 +11,7 @@ from armloop.diagnosis.whereabouts import whereabouts
 from armloop.laws.effects.time_delay import TimeDelay
 from armloop.reports.prose import Prose
 from armloop.reports.words import counted, effect_label, listed, percent, place, unit
+from armloop.reports.words import joints as of_joints
 
 if TYPE_CHECKING:
     from armloop.diagnosis import Diagnosis
@@ -22,14 +23,15 @@ def headline(diagnosis: Diagnosis) -> str:
     found = [effect_label(f.effect) for f in diagnosis.outcome.found]
     if diagnosis.contacts:
         found.append(counted(len(diagnosis.contacts), "event"))
-    if diagnosis.unlisted is not None:
-        found.append(f"unlisted effect, joint {diagnosis.unlisted.joint}")
+    joints = [law.joint for law in diagnosis.laws]
+    if joints:
+        found.append(f"unlisted effect, {of_joints(sorted(joints))}")
     return listed(found) or ("cannot tell" if diagnosis.verdict == "cannot_tell" else "no effect")
 
 
 def findings(diagnosis: Diagnosis) -> list[str]:
     """What was found, a sentence each, strongest first; what to do where a sensor is at fault."""
-    outcome, unlisted = diagnosis.outcome, diagnosis.unlisted
+    outcome, joints = diagnosis.outcome, diagnosis.model.arm.joints
     turned = [] if diagnosis.reversals is None else diagnosis.reversals.found
     values: dict[str, object] = {
         "effects": [
@@ -41,12 +43,17 @@ def findings(diagnosis: Diagnosis) -> list[str]:
         "toolless": _toolless(diagnosis),
         "few_joints": diagnosis.model.arm.n <= FEW,
         "judged": diagnosis.judged,
-        "unlisted": unlisted,
+        "laws": [
+            (
+                law,
+                unit(joints[law.joint - 1].torque_unit),
+                whereabouts(diagnosis.evidence, outcome.after, law.joint - 1).words(),
+            )
+            for law in diagnosis.laws
+        ],
+        "stated": sum(bool(law.parameters) for law in diagnosis.laws),
         "adopted": diagnosis.adopted,
     }
-    if unlisted is not None:
-        values["unit"] = unit(diagnosis.model.arm.joints[unlisted.joint - 1].torque_unit)
-        values["where"] = whereabouts(diagnosis.evidence, outcome.after, unlisted.joint - 1)
     return Prose("findings", **values).paragraphs("findings") or [_nothing(diagnosis)]
 
 
