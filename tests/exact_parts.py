@@ -49,6 +49,13 @@ STATED: dict[str, dict[str, Value]] = {
     "presliding_hysteresis": {"level": 0.2, "width": 0.01},
     "rotor_inertia": {"inertia": 0.05},
     "gravity_tilt": {"roll": 0.1, "pitch": -0.05},
+    "elastic_cable": {
+        "stiffness": 40.0,
+        "slack_length": 0.3,
+        "anchor": [0.4, 0.5, 0.6],
+        "attached": [0.1, -0.05, 0.02],
+        "link": 2.0,
+    },
     "coupling_spring": {"stiffness": 1.5, "rest": 0.3, "ratio": -0.6},
     "transmission_coupling": {"inertia": 0.02, "viscous": 0.4, "coulomb": 0.15, "ratio": -1.0},
     "external_contact": {"start": 0.0, "end": 40.0, "force": [3.0, -2.0, 5.0]},

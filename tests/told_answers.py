@@ -75,6 +75,7 @@ class Answers:
             "best_account": self.best,
             "judge_reversals": self.reversals,
             "account_with_load": self.loaded,
+            "account_with_cable": self.cabled,
             "account_with_onsets": lambda account, logs, progress, jobs: self.note("onsets", jobs, account),
             "outweighed": lambda *_: None,
             "drowned": lambda *_: False,
@@ -149,6 +150,12 @@ class Answers:
             return None
         evidence, outcome = Evidence(name="loaded", rows=ROWS.copy()), self.outcome("with the load")
         return SimpleNamespace(contacts=[], laws=[], evidence=evidence, outcome=outcome)
+
+    def cabled(self, whole: Evidence, account: Any, progress: Any, jobs: int | None) -> Any:
+        self.asked["cable"] = (whole.name, account.outcome.name, jobs)
+        if not self.given.get("cable"):
+            return None
+        return SimpleNamespace(**{**vars(account), "outcome": self.outcome("with the cable")})
 
     def reversals(self, evidence: Evidence, outcome: Any, kept: Any, progress: Any) -> Any:
         self.asked["kept"] = kept

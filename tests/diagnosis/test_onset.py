@@ -233,7 +233,7 @@ def test_it_must_be_likelier_than_all_else_worth_more_than_all_the_while_and_of_
     monkeypatch.setattr(
         onset, "is_worth", lambda _, plain, gated, *rest: (plain, gated) == ("constant", "gated") and worth
     )
-    monkeypatch.setattr(onset, "_posterior", lambda account, residual, rows: 0.0)
+    monkeypatch.setattr(onset, "posterior", lambda account, residual, rows: 0.0)
     account: Any = SimpleNamespace(contacts=[], evidence=evidence)
     assert onset._is_told(points, judged, account, np.zeros((4, 3))) == told
 
@@ -251,8 +251,8 @@ def test_an_account_is_as_likely_as_its_effects_events_and_law_allow(monkeypatch
         everywhere=lambda residual, rows: -1.0,
     )
     nothing: Any = None
-    assert onset._posterior(given, nothing, nothing) == -21.0
+    assert onset.posterior(given, nothing, nothing) == -21.0
     given.laws = [law]
-    assert onset._posterior(given, nothing, nothing) == -21.0 - 202.0
+    assert onset.posterior(given, nothing, nothing) == -21.0 - 202.0
     given.laws = [law, SimpleNamespace(joint=1, parameters={"v1": 1.0})]
-    assert onset._posterior(given, nothing, nothing) == -21.0 - 302.0
+    assert onset.posterior(given, nothing, nothing) == -21.0 - 302.0

@@ -139,6 +139,15 @@ def test_the_account_with_a_load_takes_the_place_of_that_without(monkeypatch: py
     assert made.model == ("with", "load") and answers.asked["kept"].all()
 
 
+@pytest.mark.parametrize(("carried", "asked"), [(False, "account"), (True, "with the load")])
+def test_a_cable_is_asked_for_beside_what_is_stated_without(
+    carried: bool, asked: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = Answers(monkeypatch, carried=carried, cable=True, found=["cable"])
+    assert judged(jobs=2).outcome.name == "with the cable"
+    assert answers.asked["cable"] == ("whole", asked, 2)
+
+
 def test_logs_of_other_joints_and_motor_currents_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     Answers(monkeypatch)
     arm: Any = SimpleNamespace(n=3, name="arm")

@@ -14,6 +14,7 @@ from armloop.data.repeats import require_different
 from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
 from armloop.diagnosis.account import Account, best_account, laws_instead
+from armloop.diagnosis.cables import account_with_cable
 from armloop.diagnosis.carried import account_with_load
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
 from armloop.diagnosis.event_significance import drowned, told
@@ -302,6 +303,7 @@ def diagnose(
         with Hypotheses(whole, jobs) as panel:
             account = best_account(whole, contacts, progress, panel)
         account = account_with_load(whole, account, progress, jobs) or account
+        account = account_with_cable(whole, account, progress, jobs) or account
         account = account_with_onsets(account, logs, progress, jobs)
         found = _concluded(whole, account, progress)
     stand = replace(found.standing, reasons=[*found.reasons, *own_zeros])

@@ -87,7 +87,10 @@ def _filtered(evidence: Evidence, j: int, names: Sequence[str]) -> Array:
     """(rows of a joint, p) functions of a law by their names, through the run's filter."""
     samples, law = evidence.samples, FoundLaw(j + 1)
     q, v = list(samples.motion.q.T), list(samples.motion.v.T)
-    columns = [np.broadcast_to(law.of_state({name: 1.0})(NUMPY, q, v)[j], len(q[0])) for name in names]
+    columns = [
+        np.broadcast_to(law.of_state(evidence.model.arm, {name: 1.0})(NUMPY, q, v)[j], len(q[0]))
+        for name in names
+    ]
     return smooth(samples, np.stack(columns, axis=1))[evidence.rows[:, j]]
 
 

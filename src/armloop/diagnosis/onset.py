@@ -61,7 +61,7 @@ def _with_one_more(
     whole, residual = account.whole, account.remaining()
     points = ChangePoints(known_part(whole, np.zeros_like(whole.rows)))
     # beside an event, what a profile leaves of the whole run says little
-    least = -np.inf if account.contacts else _posterior(account, residual, points.evidence.rows)
+    least = -np.inf if account.contacts else posterior(account, residual, points.evidence.rows)
     asked = _likeliest(points, account, least)
     tested = [judged for judged in asked if _is_told(points, judged, account, residual)]
     best = max(tested, key=lambda judged: judged.likely, default=None)
@@ -97,8 +97,8 @@ def _with_one_more(
     if effect not in more.outcome.after.effects or at_the_cost_of_others(account, more):
         return None
     rows = more.whole.rows & account.whole.rows
-    before = _posterior(account, residual, rows)
-    return more if _posterior(more, more.remaining(), rows) > before else None
+    before = posterior(account, residual, rows)
+    return more if posterior(more, more.remaining(), rows) > before else None
 
 
 def _asked(account: Account) -> Mask:
@@ -168,11 +168,11 @@ def _is_told(points: ChangePoints, judged: Judged, account: Account, residual: A
     """Whether an effect within the run is likelier than what was found without it, and surely more than all the while."""
     evidence, part = judged.known.evidence, judged.part
     rows, without_events = evidence.rows, evidence.rows & account.evidence.rows
-    likelier = judged.likely > _posterior(account, residual, rows)
+    likelier = judged.likely > posterior(account, residual, rows)
     if account.contacts and not likelier:
         # beside an event that it does not explain, either
         bare = replace(account, contacts=[])
-        likelier = judged.likely_of(without_events) > _posterior(bare, residual, without_events)
+        likelier = judged.likely_of(without_events) > posterior(bare, residual, without_events)
     if not likelier:
         return False
     effects, shapes = zip(
@@ -184,7 +184,7 @@ def _is_told(points: ChangePoints, judged: Judged, account: Account, residual: A
     return worth and not points.gradual(part, judged.cut) and not points.of_motion(part, judged.cut)
 
 
-def _posterior(account: Account, residual: Array, rows: Mask) -> float:
+def posterior(account: Account, residual: Array, rows: Mask) -> float:
     """Log posterior of all that an account states, of some rows (N, n), but for a constant of the run."""
     evidence = account.evidence
     effects = [*account.outcome.after.effects, *(contact.added.effect for contact in account.contacts)]

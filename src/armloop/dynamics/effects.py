@@ -110,7 +110,7 @@ def effect_law(
         links = BodyEquations(arm, body.parameters, functions, body.gravity)
         weight = _StateEquations(arm.n, lambda q, v: links.rest(q, [0.0] * arm.n))
         return EffectLaw(weight if body.weight_only else links, load=kind.load)
-    of_state = kind.of_state(parameters)
+    of_state = kind.of_state(arm, parameters)
     if of_state is not None:
         return EffectLaw(_StateEquations(arm.n, partial(of_state, functions)), load=kind.load)
     if law is None:

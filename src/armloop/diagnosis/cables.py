@@ -1,0 +1,223 @@
+"""Elastic cables: where one runs between a fixed point and a link, by separable nonlinear least squares from many starts.
+
+What pulls at a link from a point that rests is a law of the posture of all joints before it. Where it is slack at times a
+search for events finds it in one push after the other, and one for laws in stops and springs of several joints; so it is
+looked for where there are several of these, or more is left than the model's own shortcomings, and taken if the run is
+likelier with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from armloop.diagnosis.account import Account
+from armloop.diagnosis.beside import account_beside, at_the_cost_of_others, known_by, merged, with_account
+from armloop.diagnosis.contacts import without
+from armloop.diagnosis.evidence import FOLDS, Evidence
+from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.judgement import much_is_left
+from armloop.diagnosis.onset import posterior
+from armloop.diagnosis.outcomes import Found, Outcome
+from armloop.diagnosis.search import ROUNDS, TELLING
+from armloop.diagnosis.trials import Known
+from armloop.laws.effects.elastic_cable import Cable, ElasticCable
+from armloop.regression.clustered import clustered_covariance
+from armloop.robot.kinematics import LinkPoses
+from armloop.util.arrays import TINY, Array, Index, Mask
+from armloop.util.progress import Progress
+
+#: Samples that a cable is fitted to, at most; places that are tried of each link, and of these the best that are refined.
+_ROWS, _TRIED, _REFINED = 600, 200, 2
+#: Parts of an arm's reach that an anchor, a point on a link and a slack length usually are: their normal priors.
+_USUAL = np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3, 1.0])
+#: Steps of a refinement, at most.
+_STEPS = 40
+#: By itself a cable explains at least this part of what the model leaves, or is not asked about.
+_LEAST = 0.3
+
+
+def account_with_cable(
+    whole: Evidence, account: Account, progress: Progress, jobs: int | None
+) -> Account | None:
+    """The account of a run in which a cable pulls at a link; None where that is not likelier.
+
+    Args:
+        account: that without one.
+    """
+    if not _is_asked(account):
+        return None
+    progress("whether a cable pulls at a link")
+    plain = without(whole, [])
+    cable = find_cable(plain)
+    if cable is None:
+        return None
+    rows = plain.rows & account.whole.rows
+    least = posterior(account, account.remaining(), rows)
+    known = with_account(plain, [cable], account)
+    if not _is_likelier(_alone(account, plain, cable, known), rows, least):
+        return None
+    nowhere = np.zeros_like(whole.rows)
+    other = account_beside(whole, known, nowhere, progress, jobs)
+    for _ in range(ROUNDS):
+        others = with_account(whole.only(other.evidence.rows), [cable], other).fit.added()[1:]
+        again = find_cable(without(known_by(whole, others), other.contacts)) if others else None
+        if again is None:
+            break
+        before, cable = {effect.place for effect in other.outcome.after.effects}, again
+        known = with_account(whole.only(other.evidence.rows), [cable], other)
+        other = account_beside(whole, known, nowhere, progress, jobs)
+        if before == {effect.place for effect in other.outcome.after.effects}:
+            break
+    more = merged(whole, [cable], other)
+    if not any(isinstance(effect, ElasticCable) for effect in more.outcome.after.effects):
+        return None
+    if at_the_cost_of_others(account, more):
+        return None
+    return more if _is_likelier(more, rows & more.whole.rows, least) else None
+
+
+def _is_asked(account: Account) -> bool:
+    """Whether several events, or laws that load several joints, were found, a law that is not listed, or much is left."""
+    laws = sum(found.effect.load for found in account.outcome.found)
+    much = much_is_left(account.outcome.after.score).any()
+    return account.unlisted is not None or bool(much) or len(account.contacts) > 1 or laws > 1
+
+
+def _alone(account: Account, evidence: Evidence, cable: Found, known: Known) -> Account:
+    """The account of a run by the effects found and a cable, without events and laws that are not listed."""
+    outcome = Outcome([cable, *account.outcome.found], account.outcome.before, known.fit)
+    return replace(account, contacts=[], evidence=evidence, outcome=outcome, unlisted=None, further=())
+
+
+def _is_likelier(account: Account, rows: Mask, least: float) -> bool:
+    return posterior(account, account.remaining(), rows) > least
+
+
+def find_cable(evidence: Evidence) -> Found | None:
+    """The cable that explains most of a residual; of each fold where it runs on the samples outside of it.
+
+    None where none explains much.
+    """
+    problem = _Problem.of(evidence, evidence.kept)
+    best, share = problem.best()
+    if share < _LEAST:
+        return None
+    folds = evidence.fold[evidence.kept]
+    outside = [_Problem.of(evidence, evidence.kept[folds != k]).best()[0] for k in range(FOLDS)]
+    whole = _Problem.of(evidence, evidence.kept, len(evidence.kept))
+    cables = [replace(best, errors=(*whole.errors(best), problem.link_error(best))), *outside]
+    shape = Shape(cables[0].key, tuple(cable.key for cable in outside))
+    return Found(ElasticCable(cables=cables), shape, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Samples (K, n) and the residual that a cable has to explain, weighted."""
+
+    poses: LinkPoses
+    weight: Array
+    y: Array
+    block: Index
+    reach: float
+    lefts: dict[int, float]
+
+    @staticmethod
+    def of(evidence: Evidence, rows: Index, most: int = _ROWS) -> _Problem:
+        """Of samples ``rows``, no more than so many of them."""
+        rows = rows[:: -(-len(rows) // most)]
+        weight = evidence.rows[rows] / evidence.scale
+        poses = LinkPoses.of(evidence.model.arm, evidence.samples.motion.q[rows])
+        reach = float(max(np.linalg.norm(p - poses.origins[0], axis=1).max() for p in poses.p))
+        y = evidence.residual([])[rows] * weight
+        return _Problem(poses, weight, y, evidence.blocks[rows], max(reach, 0.1), {})
+
+    def best(self) -> tuple[Cable, float]:
+        """The cable that leaves least, and the part of the squares that it explains."""
+        found = [self._of_link(link) for link in range(len(self.poses.p))]
+        left, cable = min(found, key=lambda one: one[0])
+        self.lefts.update({each.link: squares for squares, each in found})
+        return cable, 1 - left / max(float((self.y**2).sum()), TINY)
+
+    def link_error(self, cable: Cable) -> float:
+        """How far the link may be off: the likelihoods of the links, of no more blocks than tell."""
+        blocks = min(len(np.unique(self.block)), TELLING)
+        links = np.array(list(self.lefts))
+        lefts = np.array(list(self.lefts.values()))
+        odds = (lefts / lefts.min()) ** (-blocks / 2)
+        return float(np.sqrt(np.average((links - cable.link) ** 2, weights=odds)))
+
+    def errors(self, cable: Cable) -> tuple[float, ...]:
+        """Standard errors (8,) of stiffness, slack length, anchor and point; their priors are one more observation."""
+        link, x = cable.link - 1, np.array([*cable.anchor, *cable.attached, cable.slack_length])
+        torque = self._torque(link, x)
+        k = self._stiffness(torque)
+        step = 1e-4 * self.reach
+        slopes = [
+            (self._torque(link, x + h) - self._torque(link, x - h)) / (2 * step) for h in step * np.eye(7)
+        ]
+        counts = self.weight > 0
+        X = np.stack([torque, *(k * slope for slope in slopes)], axis=2)[counts]
+        left = (self.y - k * torque)[counts]
+        block = np.broadcast_to(self.block[:, None], counts.shape)[counts]
+        prior = np.hstack([np.zeros((7, 1)), np.diag(1 / (_USUAL * self.reach))])
+        spread = clustered_covariance(
+            np.vstack([X, prior]),
+            np.r_[left, -prior[:, 1:] @ x],
+            np.r_[block, block.max() + 1 + np.arange(7)],
+        )
+        size = np.sqrt(np.maximum(np.diag(spread), 0.0))
+        return float(size[0]), float(size[7]), *size[1:7].tolist()
+
+    def _of_link(self, link: int) -> tuple[float, Cable]:
+        """The best cable to a link (from 0), and the squares that it leaves."""
+        starts = sorted(((self._squares(link, x), x) for x in self._starts(link)), key=lambda one: one[0])
+        refined = [self._refined(link, x) for _, x in starts[:_REFINED]]
+        left, x = min(refined, key=lambda one: one[0])
+        a, b, c, d, e, f, slack = x.tolist()
+        return left, Cable(link + 1, (a, b, c), (d, e, f), max(slack, 0.0))
+
+    def _starts(self, link: int) -> Sequence[Array]:
+        """Anchors around the link, points on it, and slack lengths between those that it has in the run, or none."""
+        rng, middle, starts = np.random.default_rng(link), self.poses.p[link].mean(axis=0), []
+        for _ in range(_TRIED):
+            anchor = middle + self.reach * rng.uniform(-1.3, 1.3, 3)
+            point = 0.5 * _USUAL[3] * self.reach * rng.normal(size=3)
+            length = np.linalg.norm(self.poses.p[link] + self.poses.R[link] @ point - anchor, axis=1)
+            slack = float(np.quantile(length, rng.uniform(0.0, 0.8))) * (rng.random() < 0.8)
+            starts.append(np.array([*anchor, *point, slack]))
+        return starts
+
+    def _refined(self, link: int, x: Array) -> tuple[float, Array]:
+        """Squares left, and where the cable runs that a start leads to, in parts of what is usual."""
+        usual = _USUAL * self.reach
+
+        def left(parts: Array) -> Array:
+            return np.concatenate([self._left(link, usual * parts).ravel(), parts])
+
+        free = np.full(7, np.inf)
+        lower = np.array([*-free[:6], 0.0])
+        found = least_squares(left, x / usual, bounds=(lower, free), max_nfev=_STEPS)
+        return self._squares(link, usual * found.x), usual * found.x
+
+    def _squares(self, link: int, x: Array) -> float:
+        return float((self._left(link, x) ** 2).sum())
+
+    def _left(self, link: int, x: Array) -> Array:
+        """(K, n) what a cable leaves, of the stiffness that leaves least (variable projection)."""
+        torque = self._torque(link, x)
+        return np.asarray(self.y - self._stiffness(torque) * torque)
+
+    def _stiffness(self, torque: Array) -> float:
+        return max(float((torque * self.y).sum()) / max(float((torque**2).sum()), TINY), 0.0)
+
+    def _torque(self, link: int, x: Array) -> Array:
+        """(K, n) of a cable of unit stiffness, weighted."""
+        p = self.poses.p[link] + self.poses.R[link] @ x[3:6]
+        d = p - x[:3]
+        length = np.maximum(np.linalg.norm(d, axis=1), TINY)
+        force = (np.maximum(length - x[6], 0.0) / length)[:, None] * d
+        return np.asarray(np.einsum("kfn,kf->kn", self.poses.jacobian(link, p), force) * self.weight)

@@ -1,0 +1,155 @@
+"""Elastic cable: a hose, a cord or a spring from a fixed point to a link, which pulls once it is stretched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from armloop.laws.effects.base import (
+    Array,
+    Context,
+    Effect,
+    Estimate,
+    Parameter,
+    StateLaw,
+    Value,
+    number,
+    with_error,
+)
+from armloop.robot.arm import Arm
+from armloop.robot.newton_euler import Vector, point_torques
+from armloop.util.functions import NUMPY, Functions
+
+#: m²: so near to its anchor a cable has no direction.
+_NOTHING = 1e-18
+
+
+@dataclass(frozen=True)
+class Cable:
+    """Where a cable runs: from its anchor in the base frame to a point in the frame of a link (from 1), m; and how long it
+    is while it is slack, m. ``errors`` are standard errors of stiffness, slack length, anchor, point and link (9,).
+    """
+
+    link: int
+    anchor: Vector
+    attached: Vector
+    slack_length: float
+    errors: tuple[float, ...] = (np.nan,) * 9
+
+    @property
+    def key(self) -> float:
+        """A number that tells its columns from those of other cables."""
+        return float(hash((self.link, self.anchor, self.attached, self.slack_length)) % 2**52)
+
+
+class ElasticCable(Effect):
+    """tau += J(q)ᵀ F, F = k max(L − L_0, 0) (p − a)/L, L = |p − a|: the gradient of the energy k (L − L_0)²/2 of a stretch.
+
+    p is the place of a point of a link, a the anchor, which rests. What is slack for a part of the time looks like one push
+    after the other, and what never is like springs of several joints. Linear in its stiffness alone: where it runs is found
+    by :mod:`armloop.diagnosis.cables`.
+
+    Args:
+        cables: where it may run, as found on all data and on parts of them.
+    """
+
+    name = "elastic_cable"
+    scope = "arm"
+    searched = False
+    parameters = (
+        Parameter("stiffness", "N/m", least=0.0, positive=True),
+        Parameter("slack_length", "m", least=0.0),
+        Parameter("anchor", "m", size=3),
+        Parameter("attached", "m", size=3),
+        Parameter("link", above=0.0),
+    )
+    needs_model = False
+    complexity = 8
+    load = True
+    watched = False
+
+    def __init__(
+        self, joint: int | None = None, other_joint: int | None = None, cables: Sequence[Cable] = ()
+    ) -> None:
+        super().__init__(joint, other_joint)
+        self.cables = {cable.key: cable for cable in cables}
+
+    def shapes(self, context: Context) -> Sequence[float]:
+        return tuple(self.cables)
+
+    def columns(self, context: Context, shape: float) -> Array:
+        return self.torque(context, {"stiffness": 1.0, **_where(self.cables[shape])})[:, :, None]
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        cable = self.cables[shape]
+        values = {"stiffness": float(x[0]), **_where(cable)}
+        each = iter(cable.errors)
+        errors = [[next(each) for _ in range(3)] if p.size == 3 else next(each) for p in self.parameters]
+        return {
+            p.name: Estimate(values[p.name], error, p.unit)
+            for p, error in zip(self.parameters, errors, strict=True)
+        }
+
+    def of_state(self, arm: Arm, parameters: Mapping[str, Value]) -> StateLaw:
+        k, slack, link = (number(parameters[key]) for key in ("stiffness", "slack_length", "link"))
+        a, attached = (_vector(parameters[key]) for key in ("anchor", "attached"))
+
+        def torque(functions: Functions, q: Sequence[Any], v: Sequence[Any]) -> list[Any]:
+            def pull(p: Vector) -> Vector:
+                d = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+                length = functions.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + _NOTHING)
+                stretch = length - slack
+                along = 0.5 * k * (stretch + abs(stretch)) / length
+                return along * d[0], along * d[1], along * d[2]
+
+            return point_torques(arm, int(link), attached, pull, functions)(q)
+
+        return torque
+
+    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+        q, v = context.motion.q, context.motion.v
+        tau = self.of_state(context.arm, parameters)(NUMPY, list(q.T), list(v.T))
+        return np.stack([np.broadcast_to(x, len(q)) for x in tau], axis=1).astype(float)
+
+    @classmethod
+    def fault(cls, parameters: Mapping[str, Any]) -> str:
+        link = number(parameters["link"])
+        return "" if link >= 1 and link == int(link) else f"link is {link:g}; links are counted from 1"
+
+    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        return super().plausible(arm, parameters) and number(parameters["link"].value) <= arm.n
+
+    def sentence(self, parameters: dict[str, Estimate]) -> str:
+        k, slack, link = (parameters[key] for key in ("stiffness", "slack_length", "link"))
+        at, to = (_place(parameters[key]) for key in ("anchor", "attached"))
+        error = number(link.std_error)
+        which = f"{number(link.value):.0f}" + (f" ± {error:.1f}" if error >= 0.05 else "")
+        return (
+            f"an elastic cable, a hose or a spring, pulls link {which} at ({to}) m in its frame towards ({at}) m in the "
+            f"base frame with {k.words()}, once it is longer than {slack.words(3)}"
+        )
+
+
+def _where(cable: Cable) -> dict[str, Value]:
+    return {
+        "slack_length": cable.slack_length,
+        "anchor": list(cable.anchor),
+        "attached": list(cable.attached),
+        "link": float(cable.link),
+    }
+
+
+def _place(estimate: Estimate) -> str:
+    values, errors = (np.atleast_1d(np.asarray(x, dtype=float)) for x in (estimate.value, estimate.std_error))
+    errors = np.broadcast_to(errors, values.shape)
+    return ", ".join(
+        with_error(x, e) if 0 < e < np.inf else f"{x:.3f}" for x, e in zip(values, errors, strict=True)
+    )
+
+
+def _vector(value: Value) -> Vector:
+    x, y, z = np.asarray(value, dtype=float).tolist()
+    return x, y, z

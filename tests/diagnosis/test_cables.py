@@ -1,0 +1,157 @@
+"""A cable between a fixed point and a link, slack for a part of the time, is one effect, and no push after the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from exact_parts import as_it_was
+from synthetic import three_axis
+from written_laws import on_joint, run
+
+from armloop.data.motion import Motion
+from armloop.data.signals import preprocess
+from armloop.diagnosis import cables, diagnose
+from armloop.diagnosis.account import Account
+from armloop.diagnosis.contacts import without
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.outcomes import Found, Outcome
+from armloop.diagnosis.trials import Known
+from armloop.laws.effects import hypotheses
+from armloop.laws.effects.elastic_cable import ElasticCable
+from armloop.laws.effects.joint_spring import JointSpring
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.robot.kinematics import LinkPoses
+
+ANCHOR, ATTACHED, SLACK, STIFFNESS = np.array([0.4, 0.3, 0.2]), np.array([0.2, 0.0, 0.0]), 0.45, 20.0
+
+
+def pull(motion: Motion, link: int = 3) -> np.ndarray:
+    """J(q)ᵀ F of a cable that is taut beyond its slack length."""
+    poses = LinkPoses.of(three_axis(), motion.q)
+    point = poses.p[link - 1] + poses.R[link - 1] @ ATTACHED
+    away = point - ANCHOR
+    length = np.linalg.norm(away, axis=1)
+    force = (STIFFNESS * np.maximum(length - SLACK, 0.0) / length)[:, None] * away
+    return np.einsum("kfn,kf->kn", poses.jacobian(link - 1, point), force)
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    return as_it_was(run(None, seed=90))
+
+
+def evidence(model: ReconstructedModel, law: Any, seed: int = 7) -> Evidence:
+    samples = preprocess([run(law, seed=seed)], model.conditioning)
+    return without(Evidence.of(model, samples, hypotheses(model.arm)), [])
+
+
+def both(motion: Motion) -> np.ndarray:
+    """A cable, and dry friction that grew."""
+    return pull(motion) + on_joint(motion, 2, 0.2 * np.sign(motion.v[:, 1]))
+
+
+def of_nothing(whole: Evidence) -> Account:
+    """What a search that found nothing states."""
+    left = Known.of(whole).fit
+    return Account(whole, [], whole, Outcome([], left, left), None)
+
+
+def check(added: AddedEffect) -> None:
+    """Within three stated errors, which are small."""
+    p = added.parameters
+    for key, truth in (
+        ("stiffness", STIFFNESS),
+        ("slack_length", SLACK),
+        ("anchor", ANCHOR),
+        ("attached", ATTACHED),
+        ("link", 3.0),
+    ):
+        off, error = np.abs(np.asarray(p[key].value) - truth), np.asarray(p[key].std_error)
+        assert (off <= 3 * error + 1e-12).all(), f"{key}: {p[key].value} ± {error}, not {truth}"
+        assert (error < 0.1 * np.abs(truth) + 0.02).all()
+
+
+def test_a_cable_is_named_with_where_it_runs_and_what_is_there_beside_it(model: ReconstructedModel) -> None:
+    whole = evidence(model, both)
+    found = cables.account_with_cable(whole, of_nothing(whole), lambda text: None, 1)
+    assert found is not None and found.contacts == [] and found.laws == []
+    added = {a.effect.name: a for a in found.outcome.added()}
+    assert sorted(added) == ["coulomb_friction", "elastic_cable"]
+    check(added["elastic_cable"])
+    level = added["coulomb_friction"].parameters["level"]
+    assert added["coulomb_friction"].effect.joint == 2 and level.value == pytest.approx(0.2, rel=0.05)
+    assert found.outcome.found[0].share > 0.8
+    # its feedforward supplies it where the run has not been, too
+    q, still = np.array([0.3, -0.4, 0.5]), np.zeros(3)
+    augmented = model.with_effects([added["elastic_cable"]])
+    more = augmented.feedforward(q, still, still) - model.feedforward(q, still, still)
+    expected = pull(Motion(np.zeros(1), q[None], still[None], still[None]))[0]
+    np.testing.assert_allclose(more, expected, atol=0.05)
+
+
+def test_springs_of_two_joints_are_no_cable(model: ReconstructedModel) -> None:
+    whole = evidence(
+        model, lambda m: on_joint(m, 1, 0.5 * m.q[:, 0]) + on_joint(m, 2, 0.8 * (m.q[:, 1] - 0.2))
+    )
+    springs = [JointSpring(1), JointSpring(2)]
+    known = Known.of(whole, springs, [Shape.fixed(0.0)] * 2).fit
+    outcome = Outcome([Found(s, Shape.fixed(0.0), 0.5) for s in springs], Known.of(whole).fit, known)
+    asked: list[str] = []
+    assert cables.account_with_cable(whole, Account(whole, [], whole, outcome, None), asked.append, 1) is None
+    assert asked == ["whether a cable pulls at a link"]
+
+
+@pytest.mark.long
+def test_a_run_with_a_cable_is_told_so(model: ReconstructedModel) -> None:
+    """Without its law it was one push after the other."""
+    found = diagnose(model, [run(both, seed=7)])
+    assert sorted(found.named) == [("coulomb_friction", 2), ("elastic_cable", None)]
+    assert found.contacts == [] and found.unlisted is None
+    check(next(a for a in found.model.effects if a.effect.name == "elastic_cable"))
+    errors = found.errors()
+    after, floor = (np.array(errors[key]) for key in ("after", "noise_floor"))
+    assert (after < 1.5 * floor).all()
+
+
+def test_where_it_runs_is_found_without_the_fold_that_is_judged(model: ReconstructedModel) -> None:
+    whole = evidence(model, pull)
+    found = cables.find_cable(whole)
+    assert found is not None and len(found.shape.without) == 2
+    assert isinstance(found.effect, ElasticCable) and found.effect.cables[found.shape.final].link == 3
+    for k in (0, 1):
+        # whatever a fold shows, it has no say in what judges it
+        spoilt = replace(whole.samples, tau=whole.samples.tau + 3.0 * (whole.fold == k)[:, None])
+        other = cables.find_cable(replace(whole, samples=spoilt))
+        assert other is None or other.shape.without[k] == found.shape.without[k]
+
+
+def test_what_no_cable_explains_has_none(model: ReconstructedModel) -> None:
+    assert cables.find_cable(evidence(model, lambda m: on_joint(m, 2, 0.6 * m.v[:, 1]))) is None
+
+
+@pytest.mark.parametrize(
+    ("laws", "events", "unlisted", "much", "asked"),
+    [
+        (0, 0, False, False, False),
+        (1, 1, False, False, False),
+        (2, 0, False, False, True),
+        (0, 2, False, False, True),
+        (0, 0, True, False, True),
+        (0, 0, False, True, True),
+    ],
+)
+def test_it_is_asked_of_what_it_may_look_like(
+    laws: int, events: int, unlisted: bool, much: bool, asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cables, "much_is_left", lambda score: np.array([False, much]))
+    made = [SimpleNamespace(effect=SimpleNamespace(load=load)) for load in [True] * laws + [False] * 3]
+    outcome = SimpleNamespace(found=made, after=SimpleNamespace(score=None))
+    account: Any = SimpleNamespace(
+        outcome=outcome, contacts=["push"] * events, unlisted="law" if unlisted else None
+    )
+    assert cables._is_asked(account) == asked
