@@ -164,6 +164,7 @@ def print_verdicts(cases: dict[str, Case]) -> int:
         "event": 0.8,
         "carried": 0.8,
         "stop": 0.9,
+        "tendon": 0.9,
         "clean": 0.95,
     }
     for kind, target in targets.items():
@@ -240,7 +241,7 @@ def _by_effect(cases: dict[str, Case]) -> str:
 def _parameters(cases: dict[str, Case]) -> str:
     found: dict[str, list[tuple[float, float]]] = {}
     for hidden, verdict in cases.values():
-        if hidden["kind"] in ("one", "two", "carried", "stop") and min(hidden["sizes"]) >= LARGE:
+        if hidden["kind"] in ("one", "two", "carried", "stop", "tendon") and min(hidden["sizes"]) >= LARGE:
             for key, relative, standard in deviations(hidden, verdict):
                 found.setdefault(key, []).append((relative, standard))
     rows = []

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import mujoco
 import numpy as np
 from outside.references import OutsideReference
 
@@ -40,6 +41,7 @@ KINDS = (
 )
 #: Springs on one side, which are hidden in runs of their own.
 STOPS = ("upper_end_stop", "lower_end_stop")
+TENDONS = ("coupling_spring", "elastic_cable")
 #: Parameters that are proportional to the torque of an effect.
 _LINEAR = {
     "payload": ("mass",),
@@ -60,6 +62,7 @@ _LINEAR = {
     "encoder_offset": ("offset",),
     "time_delay": ("seconds",),
     "gravity_tilt": ("roll", "pitch"),
+    **dict.fromkeys(TENDONS, ("stiffness",)),
     "external_contact": ("force",),
     "external_torque": ("torque",),
 }
@@ -75,7 +78,9 @@ _LAWS: dict[str, Callable[[float, np.ndarray, np.ndarray, int, int], float]] = {
 
 @dataclass(frozen=True)
 class HiddenCase:
-    """What is hidden: ``one``, ``two``, ``clean``, ``unlisted``, ``event``, ``carried``, ``stop``; effects, sizes, words."""
+    """What is hidden: ``one``, ``two``, ``clean``, ``unlisted``, ``event``, ``carried``, ``stop``, ``tendon``; effects with
+    their sizes, and words.
+    """
 
     kind: str
     effects: list[Effect] = field(default_factory=list)
@@ -114,10 +119,14 @@ def draw_case(arm: Any, reference: OutsideReference, seed: int, kind: str, size:
             load = _sized(arm, short, bare, _draw(arm, "payload", reference.seconds, rng) or {}, size)
         intervals = _cycles(reference.seconds, rng)
         return HiddenCase(kind, [{**load, "name": "carried_load", "intervals": intervals}], [size])
-    names = {"event": ("external_contact", "external_torque"), "stop": STOPS}.get(kind, KINDS[:-2])
+    own = {"event": ("external_contact", "external_torque"), "stop": STOPS, "tendon": TENDONS}
+    names = own.get(kind, KINDS[:-2])
     effects: list[Effect] = []
     while len(effects) < (2 if kind == "two" else 1):
-        effect = _draw(arm, str(rng.choice(names)), reference.seconds, rng)
+        name = str(rng.choice(names))
+        effect = (
+            _cable(arm, short, rng) if name == "elastic_cable" else _draw(arm, name, reference.seconds, rng)
+        )
         if effect is None or any(effect["name"] == other["name"] for other in effects):
             continue
         sized = _sized(arm, short, bare, effect, size)
@@ -164,6 +173,29 @@ def _sized(arm: Any, short: OutsideReference, bare: np.ndarray, effect: Effect, 
     return None if effect["name"] == "payload" and effect["mass"] > 20 else effect
 
 
+def _cable(arm: Any, short: OutsideReference, rng: Any) -> Effect:
+    """A cable to a link, from somewhere around it, that is slack for up to half of a run, or never."""
+    link = int(rng.integers(1, arm.joints + 1))
+    model = mujoco.MjModel.from_xml_string(arm.mjcf(1e-3))
+    data, attached = mujoco.MjData(model), rng.uniform(-0.15, 0.15, 3)
+    points = []
+    for q in short.q[:: max(len(short.q) // 200, 1)]:
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        points.append(data.xpos[link] + data.xmat[link].reshape(3, 3) @ attached)
+    anchor = np.mean(points, axis=0) + rng.uniform(0.3, 0.9) * (d := rng.normal(size=3)) / np.linalg.norm(d)
+    slack = float(np.quantile(np.linalg.norm(points - anchor, axis=1), rng.uniform(0.0, 0.5)))
+    return {
+        "name": "elastic_cable",
+        "joint": None,
+        "stiffness": 10.0,
+        "slack_length": slack * float(rng.choice([1.0, 1.0, 0.5])),
+        "anchor": anchor.tolist(),
+        "attached": attached.tolist(),
+        "link": link,
+    }
+
+
 def _draw(arm: Any, name: str, seconds: float, rng: Any) -> Effect | None:
     """An effect with typical parameters; the size is set later."""
     n = arm.joints
@@ -194,6 +226,16 @@ def _draw(arm: Any, name: str, seconds: float, rng: Any) -> Effect | None:
             "viscous": 0.3 * link.damping,
             "coulomb": level / 3,
         }
+    if name == "coupling_spring":
+        k = int(rng.integers(n))
+        if k == j or arm.links[j].slides or arm.links[k].slides:
+            return None
+        both = {
+            "joint": min(j, k) + 1,
+            "other_joint": max(j, k) + 1,
+            "ratio": sign * float(rng.uniform(0.5, 2.0)),
+        }
+        return {"name": name, **both, "stiffness": level, "rest": float(rng.uniform(-0.5, 0.5))}
     if name == "torque_ripple":
         order = int(rng.integers(6, 25))
         return (

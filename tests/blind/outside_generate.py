@@ -19,6 +19,8 @@ SIZES = (0.04, 0.08, 0.2)
 LOADS = ("carried", "carried", "clean", "carried")
 #: The same of runs in which a joint meets a spring on one side.
 STOPS = ("stop", "stop", "clean", "stop")
+#: The same of runs in which a spring pulls between two joints, or a cable at a link.
+TENDONS = ("tendon", "tendon", "clean", "tendon")
 #: So often another effect is drawn where one throws the arm off its path.
 _ATTEMPTS = 5
 
@@ -33,6 +35,7 @@ def generate_outside(
     points: bool = False,
     loads: bool = False,
     stops: bool = False,
+    tendons: bool = False,
 ) -> None:
     """Write one arm's cases; joints (one of the numbers), sample rate, noise and controller are drawn from the seed, too.
 
@@ -40,6 +43,7 @@ def generate_outside(
         points: the runs, not the training logs, go from point to point and dwell there.
         loads: what is hidden is a load that is carried in parts of a run.
         stops: what is hidden is a spring on one side of a position.
+        tendons: what is hidden is a spring between two joints, or a cable from a fixed point to a link.
     """
     rng = np.random.default_rng([seed, 0x0575])
     joints = int(rng.choice(numbers))
@@ -59,7 +63,7 @@ def generate_outside(
     for k, reference in enumerate(training):
         write_log(arm.simulate(reference, seed=1000 + k, **how), folder / f"baseline_{k + 1}.csv")
     for case in range(cases):
-        kinds = LOADS if loads else STOPS if stops else KINDS
+        kinds = LOADS if loads else STOPS if stops else TENDONS if tendons else KINDS
         kind, size = kinds[case % len(kinds)], SIZES[int(rng.integers(len(SIZES)))]
         speed = float(rng.uniform(0.6, 1.0))
         reference = (point_reference if points else fourier_reference)(

@@ -11,6 +11,7 @@ that is handed the path of the logs alone, and the answers are opened when all v
     python tests/blind/run.py --outside --points   … in runs that pick and place, models from sines and sweeps
     python tests/blind/run.py --outside --loads    … in which a load is carried in parts of the runs
     python tests/blind/run.py --outside --stops    … in which a joint meets a spring on one side of a position
+    python tests/blind/run.py --outside --tendons  … in which a spring pulls between two joints, or a cable at a link
     python tests/blind/run.py --measured ../shared/data   effects added to logs of three arms (--first 4, 7, …: others)
     python tests/blind/run.py --again DIR              diagnose kept logs once more
 """
@@ -105,6 +106,11 @@ def main() -> int:
         help="with --outside: a joint meets a spring on one side of a position",
     )
     parser.add_argument(
+        "--tendons",
+        action="store_true",
+        help="with --outside: a spring pulls between two joints, or a cable from a fixed point at a link",
+    )
+    parser.add_argument(
         "--measured",
         default=None,
         metavar="DATA",
@@ -129,7 +135,7 @@ def main() -> int:
         if not options.again:
             arms = options.arms if options.measured is None else min(options.arms, len(SOURCES))
             seeds = range(options.first, options.first + arms)
-            how = {"points": options.points, "loads": options.loads, "stops": options.stops}
+            how = {key: getattr(options, key) for key in ("points", "loads", "stops", "tendons")}
             reasons = {seed: kept.get(["made", seed, options.cases]) for seed in seeds}
             made = {
                 s: workers.submit(make, s, options.cases, place, outside, how, options.measured)

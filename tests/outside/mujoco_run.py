@@ -215,6 +215,18 @@ class _Acting:
         elif name in ("upper_end_stop", "lower_end_stop"):
             within = np.maximum if name == "upper_end_stop" else np.minimum
             data.qfrc_applied[j] -= e["stiffness"] * within(data.qpos[j] - e["begins"], 0.0)
+        elif name == "coupling_spring":
+            k = e["other_joint"] - 1
+            tension = e["stiffness"] * (data.qpos[j] + e["ratio"] * data.qpos[k] - e["rest"])
+            data.qfrc_applied[j] -= tension
+            data.qfrc_applied[k] -= e["ratio"] * tension
+        elif name == "elastic_cable":
+            b = int(e["link"])
+            point = data.xpos[b] + data.xmat[b].reshape(3, 3) @ np.asarray(e["attached"])
+            away = point - np.asarray(e["anchor"])
+            length = float(np.linalg.norm(away))
+            force = -e["stiffness"] * max(length - e["slack_length"], 0.0) / length * away
+            mujoco.mj_applyFT(self.model, data, force, np.zeros(3), point, b, data.qfrc_applied)
         elif name == "friction_asymmetry":
             # A dry friction of f + a forward and f - a backward is one of f beside a constant, at rest, too.
             data.qfrc_applied[j] -= e["level"]
