@@ -174,8 +174,8 @@ def _sized(arm: Any, short: OutsideReference, bare: np.ndarray, effect: Effect, 
 
 
 def _cable(arm: Any, short: OutsideReference, rng: Any) -> Effect:
-    """A cable to a link, from somewhere around it, that is slack for up to half of a run, or never."""
-    link = int(rng.integers(1, arm.joints + 1))
+    """A cable to a link beyond the first, from somewhere around it, that is slack for up to half of a run, or never."""
+    link = int(rng.integers(2, arm.joints + 1))
     model = mujoco.MjModel.from_xml_string(arm.mjcf(1e-3))
     data, attached = mujoco.MjData(model), rng.uniform(-0.15, 0.15, 3)
     points = []

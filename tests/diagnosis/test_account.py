@@ -170,7 +170,9 @@ def test_the_search_is_made_anew_while_the_torque_is_later_than_was_left_out(
     )
     further: list[Any] = []
     monkeypatch.setattr(
-        accounts, "further_laws", lambda *given: further.append(given[:3]) or [f"beside {given[2]}"]
+        accounts,
+        "further_laws",
+        lambda *given: further.append(given[:3]) or ([f"beside {given[2]}"], given[1] + 100),
     )
     asked: list[Any] = []
     monkeypatch.setattr(Account, "_or_listed", lambda account, first, *given: asked.append(first) or account)
@@ -179,7 +181,7 @@ def test_the_search_is_made_anew_while_the_torque_is_later_than_was_left_out(
     found = Account.of(whole, [contact], lambda text: None)
     searches, final = len(late), ("later", reach) if reach else whole
     final_evidence: Any = (final, 1)
-    assert found.whole == final and found.outcome == searches and made[-1] == (final, 1)  # type: ignore[comparison-overlap]
+    assert found.whole == final and found.outcome == searches + 100 and made[-1] == (final, 1)  # type: ignore[comparison-overlap]
     assert found.unlisted == f"law of {(final, 1)}" and len(made) == searches  # type: ignore[comparison-overlap]
     assert asked == [searches] and further == [(final_evidence, searches, f"law of {final_evidence}")]
     assert found.laws == [f"law of {final_evidence}", f"beside law of {final_evidence}"]

@@ -30,13 +30,13 @@ from armloop.robot.kinematics import LinkPoses
 ANCHOR, ATTACHED, SLACK, STIFFNESS = np.array([0.4, 0.3, 0.2]), np.array([0.2, 0.0, 0.0]), 0.45, 20.0
 
 
-def pull(motion: Motion, link: int = 3) -> np.ndarray:
-    """J(q)ᵀ F of a cable that is taut beyond its slack length."""
+def pull(motion: Motion, link: int = 3, least: float = 0.0) -> np.ndarray:
+    """J(q)ᵀ F of a cable that is taut beyond its slack length, or of a spring, which is stretched by no least."""
     poses = LinkPoses.of(three_axis(), motion.q)
     point = poses.p[link - 1] + poses.R[link - 1] @ ATTACHED
     away = point - ANCHOR
     length = np.linalg.norm(away, axis=1)
-    force = (STIFFNESS * np.maximum(length - SLACK, 0.0) / length)[:, None] * away
+    force = (STIFFNESS * np.maximum(length - SLACK, least) / length)[:, None] * away
     return np.einsum("kfn,kf->kn", poses.jacobian(link - 1, point), force)
 
 
@@ -130,6 +130,16 @@ def test_where_it_runs_is_found_without_the_fold_that_is_judged(model: Reconstru
         assert other is None or other.shape.without[k] == found.shape.without[k]
 
 
+def test_a_spring_that_pushes_while_it_is_short_is_told_from_a_cable(model: ReconstructedModel) -> None:
+    for least, pushes in ((-np.inf, True), (0.0, False)):
+        found = cables.find_cable(evidence(model, lambda m, least=least: pull(m, least=least)))
+        assert found is not None and isinstance(found.effect, ElasticCable)
+        cable = found.effect.cables[found.shape.final]
+        assert (cable.pushes, cable.link) == (pushes, 3) and cable.slack_length == pytest.approx(
+            SLACK, abs=0.01
+        )
+
+
 def test_what_no_cable_explains_has_none(model: ReconstructedModel) -> None:
     assert cables.find_cable(evidence(model, lambda m: on_joint(m, 2, 0.6 * m.v[:, 1]))) is None
 
@@ -138,7 +148,9 @@ def test_what_no_cable_explains_has_none(model: ReconstructedModel) -> None:
     ("laws", "events", "unlisted", "much", "asked"),
     [
         (0, 0, False, False, False),
-        (1, 1, False, False, False),
+        (1, 0, False, False, False),
+        (0, 1, False, False, False),
+        (1, 1, False, False, True),
         (2, 0, False, False, True),
         (0, 2, False, False, True),
         (0, 0, True, False, True),

@@ -239,12 +239,17 @@ class TestLawThatIsNotListed:
     def test_a_richer_library_for_fewer_joints(self) -> None:
         """Waves of so many times an angle in all, of so many joints at most, and products of two speeds."""
         chosen = [unlisted.library_of((True,) * n) for n in range(1, 9)]
-        assert [(each.N1, each.together) for each in chosen] == [
-            *[(3, None)] * 3,
-            (3, 2),
-            *[(3, 1)] * 2,
-            *[(2, 1)] * 2,
+        assert [(each.N1, each.together, each.posture) for each in chosen] == [
+            *[(3, None, 0)] * 3,
+            (3, 2, 0),
+            *[(3, 1, 2)] * 2,
+            (2, 1, 2),
+            (2, 1, 0),
         ]
+        # what pulls between two joints, and is damped by neither
+        names = [set(each.names) for each in chosen[1:7]]
+        assert all("sin(q1-q2)" in each for each in names)
+        assert ["sin(q1-q2)*v1" in each for each in names] == [True] * 3 + [False] * 3
         assert {(each.N2, each.second) for each in chosen} == {(2, "velocity")}
 
     @staticmethod

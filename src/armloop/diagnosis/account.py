@@ -78,7 +78,9 @@ class Account:
             evidence = without(whole, contacts)
             outcome = search(evidence, progress, panel)
         unlisted, kept = find_law(evidence, outcome, progress)
-        further = [] if unlisted is None else further_laws(evidence, kept, unlisted, progress)
+        further: Sequence[Unlisted] = ()
+        if unlisted is not None:
+            further, kept = further_laws(evidence, kept, unlisted, progress)
         account = Account(whole, contacts, evidence, kept, unlisted, further)
         return account._or_listed(outcome, progress, panel)
 

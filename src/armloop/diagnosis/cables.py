@@ -36,6 +36,8 @@ _ROWS, _TRIED, _REFINED = 600, 200, 2
 _USUAL = np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3, 1.0])
 #: Steps of a refinement, at most.
 _STEPS = 40
+#: A spring that leaves no more than this part less than a cable does not push in the run.
+_SAME = 1e-3
 #: By itself a cable explains at least this part of what the model leaves, or is not asked about.
 _LEAST = 0.3
 
@@ -81,10 +83,10 @@ def account_with_cable(
 
 
 def _is_asked(account: Account) -> bool:
-    """Whether several events, or laws that load several joints, were found, a law that is not listed, or much is left."""
+    """Whether several events, or laws that load a joint, were found, a law that is not listed, or much is left."""
     laws = sum(found.effect.load for found in account.outcome.found)
     much = much_is_left(account.outcome.after.score).any()
-    return account.unlisted is not None or bool(much) or len(account.contacts) > 1 or laws > 1
+    return account.unlisted is not None or bool(much) or len(account.contacts) + laws > 1
 
 
 def _alone(account: Account, evidence: Evidence, cable: Found, known: Known) -> Account:
@@ -153,12 +155,10 @@ class _Problem:
     def errors(self, cable: Cable) -> tuple[float, ...]:
         """Standard errors (8,) of stiffness, slack length, anchor and point; their priors are one more observation."""
         link, x = cable.link - 1, np.array([*cable.anchor, *cable.attached, cable.slack_length])
-        torque = self._torque(link, x)
+        torque, step = self._torque(link, x, cable.pushes), 1e-4 * self.reach
         k = self._stiffness(torque)
-        step = 1e-4 * self.reach
-        slopes = [
-            (self._torque(link, x + h) - self._torque(link, x - h)) / (2 * step) for h in step * np.eye(7)
-        ]
+        ends = [[self._torque(link, x + s * h, cable.pushes) for s in (1, -1)] for h in step * np.eye(7)]
+        slopes = [(up - down) / (2 * step) for up, down in ends]
         counts = self.weight > 0
         X = np.stack([torque, *(k * slope for slope in slopes)], axis=2)[counts]
         left = (self.y - k * torque)[counts]
@@ -177,8 +177,11 @@ class _Problem:
         starts = sorted(((self._squares(link, x), x) for x in self._starts(link)), key=lambda one: one[0])
         refined = [self._refined(link, x) for _, x in starts[:_REFINED]]
         left, x = min(refined, key=lambda one: one[0])
+        spring = self._refined(link, x, True)
+        pushes = spring[0] < (1 - _SAME) * left
+        left, x = spring if pushes else (left, x)
         a, b, c, d, e, f, slack = x.tolist()
-        return left, Cable(link + 1, (a, b, c), (d, e, f), max(slack, 0.0))
+        return left, Cable(link + 1, (a, b, c), (d, e, f), max(slack, 0.0), pushes)
 
     def _starts(self, link: int) -> Sequence[Array]:
         """Anchors around the link, points on it, and slack lengths between those that it has in the run, or none."""
@@ -191,33 +194,34 @@ class _Problem:
             starts.append(np.array([*anchor, *point, slack]))
         return starts
 
-    def _refined(self, link: int, x: Array) -> tuple[float, Array]:
+    def _refined(self, link: int, x: Array, pushes: bool = False) -> tuple[float, Array]:
         """Squares left, and where the cable runs that a start leads to, in parts of what is usual."""
         usual = _USUAL * self.reach
 
         def left(parts: Array) -> Array:
-            return np.concatenate([self._left(link, usual * parts).ravel(), parts])
+            return np.concatenate([self._left(link, usual * parts, pushes).ravel(), parts])
 
         free = np.full(7, np.inf)
         lower = np.array([*-free[:6], 0.0])
         found = least_squares(left, x / usual, bounds=(lower, free), max_nfev=_STEPS)
-        return self._squares(link, usual * found.x), usual * found.x
+        return self._squares(link, usual * found.x, pushes), usual * found.x
 
-    def _squares(self, link: int, x: Array) -> float:
-        return float((self._left(link, x) ** 2).sum())
+    def _squares(self, link: int, x: Array, pushes: bool = False) -> float:
+        return float((self._left(link, x, pushes) ** 2).sum())
 
-    def _left(self, link: int, x: Array) -> Array:
+    def _left(self, link: int, x: Array, pushes: bool) -> Array:
         """(K, n) what a cable leaves, of the stiffness that leaves least (variable projection)."""
-        torque = self._torque(link, x)
+        torque = self._torque(link, x, pushes)
         return np.asarray(self.y - self._stiffness(torque) * torque)
 
     def _stiffness(self, torque: Array) -> float:
         return max(float((torque * self.y).sum()) / max(float((torque**2).sum()), TINY), 0.0)
 
-    def _torque(self, link: int, x: Array) -> Array:
+    def _torque(self, link: int, x: Array, pushes: bool) -> Array:
         """(K, n) of a cable of unit stiffness, weighted."""
         p = self.poses.p[link] + self.poses.R[link] @ x[3:6]
         d = p - x[:3]
         length = np.maximum(np.linalg.norm(d, axis=1), TINY)
-        force = (np.maximum(length - x[6], 0.0) / length)[:, None] * d
+        stretch = length - x[6] if pushes else np.maximum(length - x[6], 0.0)
+        force = (stretch / length)[:, None] * d
         return np.asarray(np.einsum("kfn,kf->kn", self.poses.jacobian(link, p), force) * self.weight)

@@ -6,7 +6,7 @@ Waves of the angles and their sums, velocities, their products and directions, a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, reduce
 
@@ -25,9 +25,10 @@ from armloop.regression.sparse import Sparse
 from armloop.util.arrays import Array, Index
 from armloop.util.functions import NUMPY
 
-#: Most candidates of a library, and those that are tried: the order of its waves, and of how many angles one may be.
+#: Most candidates of a library, and those that are tried: the order of its waves, and of how many angles one may be with
+#: speeds, and without: what pulls between two joints is a wave of both.
 _MOST_CANDIDATES = 1500
-_RICHEST_FIRST = ((3, None), (3, 2), (3, 1), (2, 1))
+_RICHEST_FIRST = ((3, None, 0), (3, 2, 0), (3, 1, 2), (2, 1, 2), (2, 1, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +51,23 @@ class Law:
 
     def is_listed(self, j: int) -> bool:
         """Whether all of it is what listed effects of the joint (0-based) are: an offset, dry friction and drag."""
-        v = f"v{j + 1}"
-        return {name for _, name in self.terms} <= {"1", v, f"sign({v})", f"{v}^2*sign({v})"}
+        return is_listed([name for _, name in self.terms], j)
 
     def form(self, scale: float) -> str:
         """The law in N·m (N)."""
         return " ".join(f"{scale * b:+.3g}*{name}" for b, name in self.terms).removeprefix("+")
 
 
+def is_listed(names: Collection[str], j: int) -> bool:
+    """Whether all of a law's functions are what listed effects of the joint (0-based) are: an offset, dry friction, drag."""
+    v = f"v{j + 1}"
+    return set(names) <= {"1", v, f"sign({v})", f"{v}^2*sign({v})"}
+
+
 @lru_cache(maxsize=8)
 def library_of(revolute: tuple[bool, ...]) -> AngleSums:
     """The richest library that is not too large: with many joints, waves of fewer of their angles together."""
-    libraries = (AngleSums(revolute, N1, 2, "velocity", few) for N1, few in _RICHEST_FIRST)
+    libraries = (AngleSums(revolute, N1, 2, "velocity", *few) for N1, *few in _RICHEST_FIRST)
     return next(
         (each for each in libraries if each.size <= _MOST_CANDIDATES), AngleSums(revolute, 1, 2, "velocity")
     )

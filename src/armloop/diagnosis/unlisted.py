@@ -6,8 +6,9 @@ Listed effects that are part of it are named as what they are; see :mod:`armloop
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from armloop.diagnosis.judgement import (
     much_is_left,
 )
 from armloop.diagnosis.lasting import FEWEST, lasting
-from armloop.diagnosis.law_selection import Law, LawSelection, law_left, library_of, names_of
+from armloop.diagnosis.law_selection import Law, LawSelection, is_listed, law_left, library_of, names_of
 from armloop.diagnosis.outcomes import Found, Outcome, pruned, refitted, with_effects, without_effects_at
 from armloop.diagnosis.reasons import part_of_a_law
 from armloop.diagnosis.score import Score
@@ -118,6 +119,20 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
     if j is None:
         return _one_instead(evidence, outcome, progress)
     progress(f"joint {j + 1}: a residual that no listed effect explains is left; searching its law")
+    return _law_at(evidence, outcome, j, lambda bare: find_law(evidence, bare, progress))
+
+
+def _law_at(
+    evidence: Evidence,
+    outcome: Outcome,
+    j: int,
+    again: Callable[[Outcome], tuple[Unlisted | None, Outcome]],
+) -> tuple[Unlisted | None, Outcome]:
+    """The law of a real residual of joint j (0-based), and the outcome without effects that were but names for it.
+
+    Args:
+        again: what is asked of the outcome without the effects of the joint where they are not what is there.
+    """
     bare = without_effects_at(evidence, outcome, j)
     law, simpler = law_left(evidence, outcome.after, j), law_left(evidence, bare.after, j)
     split, listed = _with_listed(evidence, outcome, bare, simpler, j)
@@ -131,7 +146,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
         ):
             return _in_place(evidence, outcome, bare, simpler, j)
         elif outcome.after.score.energy[j] > FORCED * bare.after.score.energy[j]:
-            return find_law(evidence, bare, progress)
+            return again(bare)
     kept = pruned(evidence, outcome)
     # what the model itself may err by is no law either, whatever listed effects it is a sum of
     doubtful = bool(law.terms) and law.is_listed(j) and any(j in f.effect.indices for f, _ in outcome.masked)
@@ -304,24 +319,37 @@ def _parameters(evidence: Evidence, law: Law, j: int) -> dict[str, Estimate]:
     return found_law(evidence.model.arm, j + 1, terms, low, high)
 
 
-def further_laws(evidence: Evidence, outcome: Outcome, first: Unlisted, progress: Progress) -> list[Unlisted]:
+def further_laws(
+    evidence: Evidence, outcome: Outcome, first: Unlisted, progress: Progress
+) -> tuple[list[Unlisted], Outcome]:
     """Laws of what is left of other joints beside the largest residual: what acts between joints acts on each of them.
 
-    Of each the residual must be real, and its law likelier than none. What a listed effect of the joint would be is not
-    asked: the search has asked it.
+    Of each the residual must be real, and of joints that are in no law yet more than what a law never met exactly leaves.
+    Effects of its joint that were but names for its law are struck off.
     """
     laws, asked = [first], {first.joint - 1}
     while True:
         bare = without_laws(evidence, laws)
         beside = outcome if bare is evidence else refitted(bare, outcome)
-        j = _left_over(bare, beside, asked)
+        added = [each for law in laws for each in law.added()]
+        partners = {joint - 1 for each in added for joint in each.effect.joints(each.values)}
+        j = _left_over(bare, beside, asked, partners)
         if j is None:
-            return laws[1:]
+            return laws[1:], outcome
         progress(f"joint {j + 1}: its law beside that of joint {first.joint}")
         asked.add(j)
-        law = law_left(bare, beside.after, j)
-        if law.terms and not law.is_listed(j) and _is_likelier(bare, law, beside.after.score, [], j):
-            laws.append(_stated(bare, beside, law, j))
+        law, kept = _law_at(bare, beside, j, partial(_as_it_is, bare, j))
+        # a sum of listed effects was the search's to find
+        if law is None or not law.parameters or is_listed(law.parameters.keys() - set(RANGE), j):
+            continue
+        laws.append(law)
+        if [f.effect.place for f in kept.found] != [f.effect.place for f in outcome.found]:
+            outcome = refitted(evidence, kept)
+
+
+def _as_it_is(evidence: Evidence, j: int, outcome: Outcome) -> tuple[Unlisted | None, Outcome]:
+    """The law of joint j (0-based) beside an outcome, whatever effects it is like."""
+    return _stated(evidence, outcome, law_left(evidence, outcome.after, j), j), outcome
 
 
 def without_laws(evidence: Evidence, laws: Sequence[Unlisted]) -> Evidence:
@@ -335,14 +363,21 @@ def without_laws(evidence: Evidence, laws: Sequence[Unlisted]) -> Evidence:
     return replace(evidence, samples=replace(samples, tau=samples.tau - smooth(samples, torque)))
 
 
-def _left_over(evidence: Evidence, outcome: Outcome, but: Collection[int] = ()) -> int | None:
-    """The joint (0-based), but for some, with the largest residual that is real."""
+def _left_over(
+    evidence: Evidence, outcome: Outcome, but: Collection[int] = (), partners: Collection[int] = ()
+) -> int | None:
+    """The joint (0-based), but for some, with the largest residual that is real.
+
+    Args:
+        partners: joints of which even the least part is asked for.
+    """
     before, after = outcome.before, outcome.after
     n = evidence.samples.motion.joints
     ratios = np.zeros(n)
     for j in set(range(n)) - set(but):
         mine = after.stacked.joint == j
-        if mine.sum() < FEWEST or after.score.energy[j] < REMAINDER * before.score.energy[j]:
+        least = 0.0 if j in partners else REMAINDER * before.score.energy[j]
+        if mine.sum() < FEWEST or after.score.energy[j] < least:
             continue
         # Noise has energy, too, but no memory: only what lasts can be a law.
         error = after.held_out[mine] ** 2 * lasting(evidence, after.held_out[mine], j)

@@ -32,6 +32,7 @@ class AngleSums(Candidates):
         N1, N2: truncation orders; N1 bounds |k|₁ plus the powers of prismatic coordinates.
         second: a key of :data:`~armloop.features.double_feature_set.SECOND_SETS`.
         together: so many joints at most have their angles (powers) in one candidate's first factor; None for any number.
+        posture: so many in a candidate without rates, if these are more.
     """
 
     revolute: tuple[bool, ...]
@@ -39,6 +40,7 @@ class AngleSums(Candidates):
     N2: int
     second: str
     together: int | None = None
+    posture: int = 0
 
     @cached_property
     def _degrees(self) -> list[tuple[int, ...]]:
@@ -48,7 +50,7 @@ class AngleSums(Candidates):
             extended = []
             for degrees in found:
                 left = self.N1 - sum(map(abs, degrees))
-                if self.together is not None and sum(map(bool, degrees)) >= self.together:
+                if self.together is not None and sum(map(bool, degrees)) >= max(self.together, self.posture):
                     left = 0
                 first = not any(k for k, turned in zip(degrees, self.revolute[:j], strict=True) if turned)
                 least = -left if turns and not first else 0
@@ -72,13 +74,19 @@ class AngleSums(Candidates):
         place = {wave: w for w, wave in enumerate(factors.waves)}
         s, c, q = (factors.block(kind) for kind in "scq")
         first: list[tuple[int, ...]] = []
+        with_rates: list[tuple[int, ...]] = []
         for degrees in self._degrees:
             powers = tuple(q[j] for j, k in enumerate(degrees) if not self.revolute[j] for _ in range(k))
             wave = self._wave(degrees)
-            first += [(*powers, block[place[wave]]) for block in (c, s)] if any(wave) else [powers]
+            made = [(*powers, block[place[wave]]) for block in (c, s)] if any(wave) else [powers]
+            first += made
+            if self.together is None or sum(map(bool, degrees)) <= self.together:
+                with_rates += made
         rates = [e for kind in SECOND_SETS[self.second] for e in factors.block(kind)]
         second = list(combinations_with_replacement([0, *rates], self.N2)) if rates else [()]
-        return padded([sorted(e for e in a + b if e) for b in second for a in first])
+        return padded(
+            [sorted(e for e in a + b if e) for b in second for a in (with_rates if any(b) else first)]
+        )
 
     def order(self) -> NDArray[np.int_]:
         """(T,) order in the first feature set of each candidate, for nested choices of N1."""

@@ -9,19 +9,20 @@ import pytest
 from effect_arm import an_arm
 
 from armloop.data.motion import Motion
-from armloop.laws.effects import Context, Estimate, effect
+from armloop.laws.effects import EFFECTS, Context, Estimate, effect
 from armloop.laws.effects.elastic_cable import Cable, ElasticCable
 from armloop.robot.arm import Arm, load_arm
 from armloop.robot.kinematics import LinkPoses
 
 RNG = np.random.default_rng(4)
-CABLE = Cable(2, (0.4, 0.5, 0.6), (0.1, -0.05, 0.02), 0.55, tuple(0.01 * np.arange(1, 10)))
+CABLE = Cable(2, (0.4, 0.5, 0.6), (0.1, -0.05, 0.02), 0.55, False, tuple(0.01 * np.arange(1, 10)))
 P = {
     "stiffness": 40.0,
     "slack_length": 0.55,
     "anchor": [0.4, 0.5, 0.6],
     "attached": [0.1, -0.05, 0.02],
     "link": 2.0,
+    "pushes": 0.0,
 }
 
 
@@ -31,8 +32,8 @@ def context(arm: Arm, q: np.ndarray) -> Context:
 
 
 @pytest.mark.parametrize("arm", [an_arm(), load_arm("scara")], ids=lambda arm: str(arm.name))
-@pytest.mark.parametrize("link", [1, 3])
-def test_the_torque_is_the_gradient_of_the_energy_of_its_stretch(arm: Arm, link: int) -> None:
+@pytest.mark.parametrize(("link", "pushes"), [(1, 0.0), (3, 0.0), (3, 1.0)])
+def test_the_torque_is_the_gradient_of_the_energy_of_its_stretch(arm: Arm, link: int, pushes: float) -> None:
     """The third joint of a SCARA slides."""
     q = RNG.uniform(-0.5, 0.5, (40, arm.n))
 
@@ -42,22 +43,25 @@ def test_the_torque_is_the_gradient_of_the_energy_of_its_stretch(arm: Arm, link:
         return np.asarray(np.linalg.norm(point - [0.4, 0.5, 0.6], axis=1))
 
     slack = float(np.median(length(q)))
-    given = {**P, "slack_length": slack, "link": float(link)}
+    given = {**P, "slack_length": slack, "link": float(link), "pushes": pushes}
     tau = ElasticCable().torque(context(arm, q), given)
     steps = 1e-6 * np.eye(arm.n)
-    energy = [[20.0 * np.maximum(length(q + s * h) - slack, 0) ** 2 for s in (1, -1)] for h in steps]
+    least = -np.inf if pushes else 0.0
+    energy = [[20.0 * np.maximum(length(q + s * h) - slack, least) ** 2 for s in (1, -1)] for h in steps]
     gradient = np.stack([(up - down) / 2e-6 for up, down in energy], axis=1)
     np.testing.assert_allclose(tau, gradient, atol=1e-6)
     taut = length(q) > slack
-    assert tau[taut].any() and not tau[~taut].any() and not tau[:, link:].any()
+    assert tau[taut].any() and tau[~taut].any() == bool(pushes) and not tau[:, link:].any()
 
 
 def test_its_column_is_the_torque_of_a_unit_stiffness_where_it_was_found_to_run() -> None:
-    other = replace(CABLE, slack_length=0.2)
+    other = replace(CABLE, slack_length=0.2, pushes=True)
     kind, here = ElasticCable(cables=[CABLE, other]), context(an_arm(), RNG.uniform(-1, 1, (6, 3)))
-    assert kind.shapes(here) == (CABLE.key, other.key) and CABLE.key != other.key
+    assert kind.shapes(here) == (CABLE.key, other.key)
+    assert len({CABLE.key, other.key, replace(CABLE, pushes=True).key, replace(CABLE, link=1).key}) == 4
     for cable in (CABLE, other):
-        expected = kind.torque(here, {**P, "slack_length": cable.slack_length}) / 40.0
+        given = {**P, "slack_length": cable.slack_length, "pushes": float(cable.pushes)}
+        expected = kind.torque(here, given) / 40.0
         np.testing.assert_allclose(kind.columns(here, cable.key)[:, :, 0], expected, atol=1e-12)
 
 
@@ -66,11 +70,16 @@ def test_it_is_stated_with_the_errors_of_where_it_runs() -> None:
     found = kind.estimates(an_arm(), np.array([40.0]), np.zeros((1, 1)), CABLE.key)
     assert {key: e.value for key, e in found.items()} == P
     errors = np.hstack([found[key].std_error for key in P])
-    np.testing.assert_allclose(errors, 0.01 * np.arange(1, 10))
+    np.testing.assert_allclose(errors, [*(0.01 * np.arange(1, 10)), 0.0])
     assert (
         "pulls link 2 ± 0.1 at (0.100 ± 0.060, -0.050 ± 0.070, 0.020 ± 0.080) m in its frame towards (0.400 ± 0.030, "
         "0.500 ± 0.040, 0.600 ± 0.050) m in the base frame with 40.000 ± 0.010 N/m, once it is longer than 0.550 ± 0.020 m"
     ) in kind.sentence(found)
+    spring = {**found, "pushes": Estimate(1.0, 0.0, "1")}
+    assert "a spring holds link 2 ± 0.1 at" in kind.sentence(spring)
+    assert "at 0.550 ± 0.020 m from (" in kind.sentence(spring) and kind.sentence(spring).endswith(
+        "pulls and pushes"
+    )
     sure = {**found, "link": Estimate(2.0, 0.01, "1"), "anchor": Estimate([0.4, 0.5, 0.6], float("nan"), "m")}
     assert "pulls link 2 at" in kind.sentence(sure) and "towards (0.400, 0.500, 0.600) m" in kind.sentence(
         sure
@@ -89,3 +98,10 @@ def test_it_pulls_at_a_link_that_is_there(of: dict[str, float], possible: bool) 
 @pytest.mark.parametrize(("link", "right"), [(1.0, True), (3.0, True), (0.5, False), (2.5, False)])
 def test_links_are_whole_and_counted_from_one(link: float, right: bool) -> None:
     assert (ElasticCable.fault({**P, "link": link}) == "") == right
+
+
+@pytest.mark.parametrize(("pushes", "right"), [(0.0, True), (1.0, True), (0.5, False)])
+def test_it_pushes_or_it_does_not(pushes: float, right: bool) -> None:
+    assert (ElasticCable.fault({**P, "pushes": pushes}) == "") == right
+    said = {key: value for key, value in P.items() if key != "pushes"}
+    assert ElasticCable.fault(said) == "" and EFFECTS["elastic_cable"].parameters[-1].default == 0.0

@@ -1,4 +1,7 @@
-"""Elastic cable: a hose, a cord or a spring from a fixed point to a link, which pulls once it is stretched."""
+"""Elastic cable: a hose, a cord or a spring from a fixed point to a link, which pulls once it is stretched.
+
+A spring pushes, too, while it is shorter than when it rests.
+"""
 
 from __future__ import annotations
 
@@ -30,27 +33,29 @@ _NOTHING = 1e-18
 @dataclass(frozen=True)
 class Cable:
     """Where a cable runs: from its anchor in the base frame to a point in the frame of a link (from 1), m; and how long it
-    is while it is slack, m. ``errors`` are standard errors of stiffness, slack length, anchor, point and link (9,).
+    is while it is slack, m; and whether it pushes where it is shorter, as a spring does. ``errors`` are standard errors of
+    stiffness, slack length, anchor, point and link (9,).
     """
 
     link: int
     anchor: Vector
     attached: Vector
     slack_length: float
+    pushes: bool = False
     errors: tuple[float, ...] = (np.nan,) * 9
 
     @property
     def key(self) -> float:
         """A number that tells its columns from those of other cables."""
-        return float(hash((self.link, self.anchor, self.attached, self.slack_length)) % 2**52)
+        return float(hash((self.link, self.anchor, self.attached, self.slack_length, self.pushes)) % 2**52)
 
 
 class ElasticCable(Effect):
     """tau += J(q)ᵀ F, F = k max(L − L_0, 0) (p − a)/L, L = |p − a|: the gradient of the energy k (L − L_0)²/2 of a stretch.
 
-    p is the place of a point of a link, a the anchor, which rests. What is slack for a part of the time looks like one push
-    after the other, and what never is like springs of several joints. Linear in its stiffness alone: where it runs is found
-    by :mod:`armloop.diagnosis.cables`.
+    p is the place of a point of a link, a the anchor, which rests; of a spring, which ``pushes``, F = k (L − L_0) (p − a)/L.
+    What is slack for a part of the time looks like one push after the other, and what never is like springs of several
+    joints. Linear in its stiffness alone: where it runs is found by :mod:`armloop.diagnosis.cables`.
 
     Args:
         cables: where it may run, as found on all data and on parts of them.
@@ -65,6 +70,7 @@ class ElasticCable(Effect):
         Parameter("anchor", "m", size=3),
         Parameter("attached", "m", size=3),
         Parameter("link", above=0.0),
+        Parameter("pushes", default=0.0),
     )
     needs_model = False
     complexity = 8
@@ -86,7 +92,7 @@ class ElasticCable(Effect):
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         cable = self.cables[shape]
         values = {"stiffness": float(x[0]), **_where(cable)}
-        each = iter(cable.errors)
+        each = iter([*cable.errors, 0.0])
         errors = [[next(each) for _ in range(3)] if p.size == 3 else next(each) for p in self.parameters]
         return {
             p.name: Estimate(values[p.name], error, p.unit)
@@ -95,6 +101,7 @@ class ElasticCable(Effect):
 
     def of_state(self, arm: Arm, parameters: Mapping[str, Value]) -> StateLaw:
         k, slack, link = (number(parameters[key]) for key in ("stiffness", "slack_length", "link"))
+        both = number(parameters.get("pushes", 0.0))
         a, attached = (_vector(parameters[key]) for key in ("anchor", "attached"))
 
         def torque(functions: Functions, q: Sequence[Any], v: Sequence[Any]) -> list[Any]:
@@ -102,7 +109,7 @@ class ElasticCable(Effect):
                 d = p[0] - a[0], p[1] - a[1], p[2] - a[2]
                 length = functions.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + _NOTHING)
                 stretch = length - slack
-                along = 0.5 * k * (stretch + abs(stretch)) / length
+                along = 0.5 * k * ((1 + both) * stretch + (1 - both) * abs(stretch)) / length
                 return along * d[0], along * d[1], along * d[2]
 
             return point_torques(arm, int(link), attached, pull, functions)(q)
@@ -116,8 +123,10 @@ class ElasticCable(Effect):
 
     @classmethod
     def fault(cls, parameters: Mapping[str, Any]) -> str:
-        link = number(parameters["link"])
-        return "" if link >= 1 and link == int(link) else f"link is {link:g}; links are counted from 1"
+        link, pushes = number(parameters["link"]), number(parameters.get("pushes", 0.0))
+        if link < 1 or link != int(link):
+            return f"link is {link:g}; links are counted from 1"
+        return "" if pushes in (0, 1) else f"pushes is {pushes:g}; it is 1 of a spring, 0 of a cable"
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         return super().plausible(arm, parameters) and number(parameters["link"].value) <= arm.n
@@ -127,9 +136,15 @@ class ElasticCable(Effect):
         at, to = (_place(parameters[key]) for key in ("anchor", "attached"))
         error = number(link.std_error)
         which = f"{number(link.value):.0f}" + (f" ± {error:.1f}" if error >= 0.05 else "")
+        where = f"link {which} at ({to}) m in its frame"
+        if "pushes" in parameters and number(parameters["pushes"].value):
+            return (
+                f"a spring holds {where} at {slack.words(3)} from ({at}) m in the base frame with {k.words()}: it pulls and "
+                "pushes"
+            )
         return (
-            f"an elastic cable, a hose or a spring, pulls link {which} at ({to}) m in its frame towards ({at}) m in the "
-            f"base frame with {k.words()}, once it is longer than {slack.words(3)}"
+            f"an elastic cable, a hose or a spring, pulls {where} towards ({at}) m in the base frame with {k.words()}, once "
+            f"it is longer than {slack.words(3)}"
         )
 
 
@@ -139,6 +154,7 @@ def _where(cable: Cable) -> dict[str, Value]:
         "anchor": list(cable.anchor),
         "attached": list(cable.attached),
         "link": float(cable.link),
+        "pushes": float(cable.pushes),
     }
 
 
