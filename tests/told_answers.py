@@ -121,8 +121,11 @@ class Answers:
         still = self.given["still"]
         return "still" if (evidence.name in still if isinstance(still, tuple) else still) else ""
 
-    def standing(self, evidence: Evidence, model: Any, errors: Any, joints: Any) -> Standing:
+    def standing(
+        self, evidence: Evidence, model: Any, errors: Any, joints: Any, found: bool = False
+    ) -> Standing:
         self.asked["standing"] = (evidence.name, model, errors, list(joints))
+        self.asked["found"] = found
         self.asked["judged"] = evidence.rows
         return Standing(["stands"], unknown=self.given["unknown"])
 

@@ -41,16 +41,27 @@ def test_what_was_not_found_before_must_gain_beside_what_is_hidden(
 
 
 @pytest.mark.parametrize(
-    ("clear", "shown", "hidden"),
+    ("clear", "shown", "together", "hidden"),
     [
-        (2.0, 15.0, True),
-        (2.0, 2.5, False),  # not plain in the run, either
-        (14.0, 17.0, False),  # plain whatever the model errs by, yet worth nothing: too few blocks show it
+        (2.0, 15.0, 7.0, True),
+        (2.0, 2.5, 7.0, False),  # not plain in the run, either
+        (
+            14.0,
+            17.0,
+            200.0,
+            False,
+        ),  # plain whatever the model errs by, yet worth nothing: too few blocks show it
+        (2.0, 15.0, 30.0, False),  # with the part that another law is by itself it is plain
     ],
 )
 def test_only_what_the_models_own_errors_make_unclear_is_masked_by_them(
-    clear: float, shown: float, hidden: bool
+    clear: float, shown: float, together: float, hidden: bool
 ) -> None:
     delay, spring = one("time_delay", None), one("joint_spring")
-    fit: Any = SimpleNamespace(clear=(clear, 20.0), shown=(shown, 20.0), added=lambda: ["delay", "spring"])
+    fit: Any = SimpleNamespace(
+        clear=(clear, 20.0),
+        shown=(shown, 20.0),
+        wald=((together, 2), (400.0, 2)),
+        added=lambda: ["delay", "spring"],
+    )
     assert masked(fit, [delay, spring], [delay.effect]) == ([(delay, "delay")] if hidden else [])

@@ -81,7 +81,9 @@ def test_a_run_that_moves_is_searched(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     law = (
-        None if unlisted is None else SimpleNamespace(joint=unlisted, parameters={}, instead="drag is a part")
+        None
+        if unlisted is None
+        else SimpleNamespace(joint=unlisted, parameters={}, instead="drag is a part", added=list)
     )
     answers = Answers(
         monkeypatch, found=found, contacts=contacts, unlisted=law, turned=turned, unknown=unknown
@@ -104,6 +106,7 @@ def test_a_run_that_moves_is_searched(
         ("errors", True),
         [] if unlisted is None else [unlisted],
     )
+    assert answers.asked["found"] == bool(found or contacts or law)
     # what is too small to be stated is asked of what nothing accounts for, beside no law that is not listed
     small = None if turned or law else ("account", found, [1])
     assert answers.asked.get("suspected") == small
@@ -283,7 +286,7 @@ def test_an_event_that_may_be_of_an_unknown_rest_goes_and_is_told(
 ) -> None:
     """A residual that the verdict names is a rest as long as it has no law."""
     other = SimpleNamespace(added="other push", rows=np.zeros(4, dtype=bool))
-    unlisted = SimpleNamespace(joint=3, parameters={"law": form} if form else {}, instead="")
+    unlisted = SimpleNamespace(joint=3, parameters={"law": form} if form else {}, instead="", added=list)
     Answers(monkeypatch, contacts=[CONTACT, other], unlisted=unlisted)
     asked: list[Any] = []
 

@@ -76,7 +76,13 @@ class TestSearch:
             names = [str(f.effect) for f in found]
             shown = [plain.get(name, 0.0) for name in names]
             added = [SimpleNamespace(effect=SimpleNamespace(joint=1), name=name) for name in names]
-            fit = SimpleNamespace(score=of(names), clear=[0.0] * len(names), shown=shown, added=lambda: added)
+            fit = SimpleNamespace(
+                score=of(names),
+                clear=[0.0] * len(names),
+                shown=shown,
+                wald=[(0.0, 1)] * len(names),
+                added=lambda: added,
+            )
             return SimpleNamespace(names=names, fit=fit)
 
         model = SimpleNamespace(arm=None, friction=FrictionLaw(((),)))

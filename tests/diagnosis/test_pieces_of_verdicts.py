@@ -136,6 +136,8 @@ class TestReasons:
         ) -> bool | None:
             words, real = reasons._multiple(Parts(1, 0.5, left, noise, error, None, apart), 0, 2.5)
             assert words.startswith("joint 1: the residual is 2.5 times the baseline")
+            left_over, _ = reasons._multiple(Parts(1, 0.5, left, noise, error, None, apart), 0, 2.5, True)
+            assert left_over == words.replace("the residual", "what is left", 1)
             assert ("something is there" in words) == (left is None or error is None or noise is None)
             assert ("nor a law that is stated accounts for it" in words) == (
                 real is True and "something" not in words
@@ -212,12 +214,20 @@ class TestReasons:
         monkeypatch.setattr(
             reasons,
             "_multiple",
-            lambda part, j, ratio: (f"{part.joint} {ratio:g}", of.get("real", (False, True, None))[j]),
+            lambda part, j, ratio, found: (
+                f"{part.joint} {ratio:g}{' left' * found}",
+                of.get("real", (False, True, None))[j],
+            ),
         )
         augmented: Any = 0.75
-        found = reasons.standing(evidence, augmented, after, of.get("explained", []))
+        found = reasons.standing(evidence, augmented, after, of.get("explained", []), of.get("found", False))
         assert (seen[0] == 0.75).all()
         return (found.reasons, found.unknown) if of.get("left") is None else found.left
+
+    def test_what_is_left_of_something_found_is_said_to_be_that(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        assert self.standing(monkeypatch, [1.0, None, 0.99], found=True) == (["1 2 left"], False)
 
     def test_twice_the_baseline_is_no_baseline(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert self.standing(monkeypatch, [1.0, None, 0.99]) == (["1 2"], False)

@@ -396,7 +396,7 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             found = replace(found, unlisted=stated[0], further=stated[1:])
         # a law accounts for what it removes, adopted or not
         left = replace(found, adopted=True).errors()["after"]
-        stand = standing(evidence.only(sliding), augmented, left, known)
+        stand = standing(evidence.only(sliding), found.adopt().model, left, known, named or bool(laws))
         searched = [f for f in outcome.found if turned is None or f not in turned.found]
         doubtful = outweighed(evidence, outcome, searched, stand.left, sliding[evidence.rows])
         if doubtful is not None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from typing import Protocol, TypeVar
 
-from armloop.diagnosis.fit import Fit
+from armloop.diagnosis.fit import Fit, deviate
 from armloop.diagnosis.judgement import SIGNIFICANCE
 from armloop.laws.effects import Effect
 from armloop.model import AddedEffect
@@ -26,15 +26,18 @@ F = TypeVar("F", bound=_Found)
 def masked(fit: Fit, found: Sequence[F], unclear: Collection[Effect]) -> list[tuple[F, AddedEffect]]:
     """Those of the effects found, with their parameters, that are unclear only as the model itself errs by as much.
 
+    Where all that an effect is of is clear together, a part of it is there that another law is by itself: the model errs by
+    less than that.
+
     Args:
         fit: all that was found.
         unclear: effects of it that are not stated: not clear of their stated errors, or worth nothing.
     """
-    every = zip(found, fit.added(), fit.clear, fit.shown, strict=True)
+    every = zip(found, fit.added(), fit.clear, fit.shown, fit.wald, strict=True)
     return [
         (f, added)
-        for f, added, clear, shown in every
-        if f.effect in unclear and clear < SIGNIFICANCE <= shown
+        for f, added, clear, shown, wald in every
+        if f.effect in unclear and max(clear, deviate(*wald)) < SIGNIFICANCE <= shown
     ]
 
 

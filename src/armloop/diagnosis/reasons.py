@@ -55,14 +55,19 @@ class Standing:
 
 
 def standing(
-    evidence: Evidence, augmented: ReconstructedModel, after: Sequence[float | None], explained: Sequence[int]
+    evidence: Evidence,
+    augmented: ReconstructedModel,
+    after: Sequence[float | None],
+    explained: Sequence[int],
+    found: bool = False,
 ) -> Standing:
-    """How far a run can be judged, once everything found is in the augmented model.
+    """How far a run can be judged, once everything found is in the augmented model, adopted or not.
 
     Args:
         after: per joint the held-out RMSE with everything found, an unlisted law included, N·m (N); NaN where a joint did
             not move.
         explained: joints (1-based) whose residual the verdict names already.
+        found: whether anything was.
     """
     samples, model = evidence.samples, evidence.model
     left = evidence.left_by(augmented)
@@ -89,7 +94,7 @@ def standing(
         judged += 1
         if poor or not ratio > 1:
             continue
-        words, real = _multiple(part, j, ratio)
+        words, real = _multiple(part, j, ratio, found)
         if ratio >= MULTIPLE:
             multiples.append(real)
             reasons.append(words)
@@ -268,9 +273,13 @@ def _too_poor(model: ReconstructedModel, j: int) -> str:
     return f"joint {j + 1}: the model leaves {share:.0%} of the torque on its own training logs: it judges nothing there"
 
 
-def _multiple(part: Parts, j: int, ratio: float) -> tuple[str, bool | None]:
-    """A sentence on a residual that nothing accounts for, and whether it is more than noise; None if nobody knows."""
-    size = f"joint {j + 1}: the residual is {ratio:.1f} times the baseline"
+def _multiple(part: Parts, j: int, ratio: float, found: bool = False) -> tuple[str, bool | None]:
+    """A sentence on a residual that nothing accounts for, and whether it is more than noise; None if nobody knows.
+
+    Args:
+        found: whether it is what something that was found leaves.
+    """
+    size = f"joint {j + 1}: {'what is left' if found else 'the residual'} is {ratio:.1f} times the baseline"
     left, error, noise = part.predictable_left, part.std_error, part.noise
     if left is None or error is None or noise is None:
         return (
