@@ -13,6 +13,7 @@ from synthetic import fourier_motion, three_axis
 
 from armloop.data.motion import Motion
 from armloop.diagnosis import pushes
+from armloop.diagnosis.event_size import event_size, event_size_error
 from armloop.laws.effects import Context, Estimate, effect
 from armloop.model import AddedEffect
 from armloop.robot.kinematics import tool_jacobian
@@ -30,22 +31,22 @@ class TestSizeOfAPush:
         for felt, size in ((0.031, 2.0), (0.029, 0.0)):
             columns = np.array([[[1.0, 0.0]], [[0.0, felt]]])
             y = np.array([[3.0], [2.0 * felt]])
-            np.testing.assert_allclose(pushes._size(columns, y), [3.0, size])
+            np.testing.assert_allclose(event_size(columns, y), [3.0, size])
 
     def test_its_error_counts_pieces_and_what_is_not_felt_may_be_as_large_as_what_is(self) -> None:
         columns = np.zeros((4, 1, 2))
         columns[:, 0, 0] = 1.0
         left, pieces = np.array([[1.0], [2.0], [3.0], [-1.0]]), np.array([0, 0, 1, 1])
-        error = pushes._size_error(columns, np.array([3.0, 4.0]), left, pieces)
+        error = event_size_error(columns, np.array([3.0, 4.0]), left, pieces)
         # scores of the pieces 3 and 2, over four samples
         np.testing.assert_allclose(error, [np.sqrt(13) / 4, 5.0])
         # felt by a hundredth: still felt enough for the error that its square has
         columns[:, 0, 1] = [0.05, -0.05, 0.05, -0.05]
-        error = pushes._size_error(columns, np.array([3.0, 4.0]), 0 * left, pieces)
+        error = event_size_error(columns, np.array([3.0, 4.0]), 0 * left, pieces)
         np.testing.assert_allclose(error, 0.0, atol=1e-6)
         columns[:, 0, 1] /= 2
         np.testing.assert_allclose(
-            pushes._size_error(columns, np.array([3.0, 4.0]), 0 * left, pieces), [0.0, 5.0], atol=1e-6
+            event_size_error(columns, np.array([3.0, 4.0]), 0 * left, pieces), [0.0, 5.0], atol=1e-6
         )
 
 
@@ -304,6 +305,7 @@ class TestTrialOfAPush:
             pushes, "FEW", 2
         )  # so that a force is what an arm of three joints feels above all
         monkeypatch.setattr(pushes, "MOSTLY", 0.6)
+        monkeypatch.setattr(pushes, "_is_clear", lambda found: True)
         monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
         evidence: Any = SimpleNamespace(
             samples=SimpleNamespace(motion=motion((100,), 3), period=0.01, reach=0.02),

@@ -10,6 +10,7 @@ import numpy as np
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
+from armloop.diagnosis.event_size import event_size, event_size_error
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import REFINEMENTS
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, NOTICEABLE, enough, leaves_more
@@ -156,8 +157,21 @@ def push(
     # the joints beyond another link feel nothing of what pushes that
     beyond = force if chosen.link in (0, n) or held > most + FREEDOM else None
     # what one joint alone shows may be due to a force on any link from that on
-    alone = [kind.effect.joint for _, kind in equals if kind.effect.joint is not None]
-    return _somewhere(best, anywhere, beyond, min(alone, default=None))
+    alone = {kind.effect.joint: (trial, kind) for trial, kind in equals if kind.effect.joint is not None}
+    force_found = _somewhere(best, anywhere, beyond, min(alone, default=None))
+    if not alone or _is_clear(force_found):
+        return force_found
+    # of a force that nobody knows the torque is all there is to say
+    torque, kind = max(alone.values(), key=lambda one: one[0].share)
+    others = [(effect_, share) for effect_, share in best.rivals if effect_.place != kind.effect.place]
+    return replace(torque, rivals=[(chosen.effect, best.share), *others])
+
+
+def _is_clear(found: Contact) -> bool:
+    """Whether a force is larger than its standard error along its own direction."""
+    force = found.added.parameters["force"]
+    value, error = (np.asarray(x, dtype=float) for x in (force.value, force.std_error))
+    return bool(value @ value > np.linalg.norm(value * error))
 
 
 def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, joint: int) -> Contact | None:
@@ -273,12 +287,12 @@ def _trial(
         mine = pieces % 2 == fold
         if mine.all() or not mine.any():
             return None
-        left[mine] -= columns[mine] @ _size(columns[~mine], y[~mine])
+        left[mine] -= columns[mine] @ event_size(columns[~mine], y[~mine])
     energy = float((y**2).sum())
     if energy <= 0:
         return None
-    size = _size(columns, y)
-    error = _size_error(columns, size, y - columns @ size, pieces)
+    size = event_size(columns, y)
+    error = event_size_error(columns, size, y - columns @ size, pieces)
     joints = evidence.model.arm.joints
     unit = joints[0].position_unit if len({j.position_unit for j in joints}) == 1 else "rad or m"
     tells = np.asarray(weight[:, columns.any(axis=(0, 2))].any(axis=1))
@@ -335,7 +349,7 @@ def _best_interval(
 
     def explained(stretch: slice) -> float:
         _, columns, y = _burst(evidence, residual, weight, stretch, kind)
-        return float((y**2).sum() - ((y - columns @ _size(columns, y)) ** 2).sum())
+        return float((y**2).sum() - ((y - columns @ event_size(columns, y)) ** 2).sum())
 
     found = []
     for stretch in (burst, _peak(evidence, (residual * weight)[:, shown], burst)):
@@ -372,7 +386,7 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
     if middle.stop - middle.start < 4:
         return burst
     _, columns, y = _burst(evidence, residual, weight, middle, kind)
-    size = _size(columns, y)
+    size = event_size(columns, y)
     near = slice(max(run.start, burst.start - margin), min(run.stop, burst.stop + margin))
     _, columns, y = _burst(evidence, residual, weight, near, kind)
     # Half of it explains a sample as well as nothing or all does: what comes and goes smoothly counts from there.
@@ -400,7 +414,7 @@ def _rise(evidence: Evidence, residual: Array, weight: Array, burst: slice, kind
     left = []
     for profile in (np.abs(off) <= 0.5, np.where(np.abs(off) < 1, np.cos(np.pi * off / 2) ** 2, 0.0)):
         X = columns * profile[:, None, None]
-        left.append(float(((y - X @ _size(X, y)) ** 2).sum()))
+        left.append(float(((y - X @ event_size(X, y)) ** 2).sum()))
     return 0.5 * (end - start) if left[1] < left[0] else 0.0
 
 
@@ -423,23 +437,3 @@ def _edge_errors(evidence: Evidence, burst: slice, tells: Mask, rise: float) -> 
     silent = motion.time[burst.start] - motion.time[first], motion.time[last] - motion.time[burst.stop - 1]
     start, end = (float(np.hypot(edge, max(beside, rise) / np.sqrt(3))) for beside in silent)
     return start, end
-
-
-def _size(columns: Array, y: Array) -> Array:
-    """(p,) mean force or torque; along directions in which the arm hardly feels a force, none."""
-    X = columns.reshape(-1, columns.shape[2])
-    return np.asarray(np.linalg.lstsq(X, y.ravel(), rcond=NOTICEABLE)[0])
-
-
-def _size_error(columns: Array, size: Array, left: Array, pieces: Index) -> Array:
-    """(p,) standard error of the mean force or torque, pieces being the independent units.
-
-    Along directions in which the arm does not feel a force, it may be as large as the one that is felt.
-    """
-    X = columns.reshape(-1, columns.shape[2])
-    G = X.T @ X
-    bread = np.linalg.pinv(G, rcond=NOTICEABLE**2)
-    scores = np.einsum("njf,nj->nf", columns, left)
-    sums = np.array([scores[pieces == piece].sum(axis=0) for piece in np.unique(pieces)])
-    hidden = np.clip(np.diag(np.eye(len(G)) - bread @ G), 0.0, 1.0) * float(size @ size)
-    return np.asarray(np.sqrt(np.diag(bread @ (sums.T @ sums) @ bread) + hidden))
