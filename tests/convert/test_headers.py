@@ -110,3 +110,17 @@ def test_a_motors_current_is_measured(tmp_path, log):
     names = [each.format(j) for each in ("q{} [rad]", "v{} [rad/s]", "motor_current{}") for j in (1, 2, 3)]
     path = write(tmp_path / "log.csv", ["time [s]", *names], log, per_unit=np.ones(3))
     assert_same(convert([path], answers=Answers(tau_unit="A")).log, log)
+
+
+@pytest.mark.parametrize(
+    ("said", "factor"),
+    [("N*mm", 1e-3), ("Nmm", 1e-3), ("N·mm", 1e-3), ("mNm", 1e-3), ("Ncm", 1e-2), ("cN*m", 1e-2), ("kNm", 1e3)],
+)
+def test_torques_in_parts_of_a_newton_metre_are_read(tmp_path, log, said, factor):
+    names = ["time [s]", *(f"{x}{j} [{unit}]" for x, unit in (("q", "rad"), ("v", "rad/s")) for j in (1, 2, 3))]
+    names += [f"tau{j} [{said}]" for j in (1, 2, 3)]
+    path = tmp_path / "log.csv"
+    cells = np.column_stack([log.time, log.q, log.v, log.tau / factor])
+    path.write_text("\n".join([",".join(names), *(",".join(f"{x:.12g}" for x in row) for row in cells)]))
+    found = convert([path]).log
+    np.testing.assert_allclose(found.tau, log.tau, rtol=1e-9)

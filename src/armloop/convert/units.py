@@ -13,7 +13,7 @@ FACTORS: dict[str, dict[str, float]] = {
     "q": {"rad": 1.0, "deg": _DEGREE, "rev": 2 * np.pi, "m": 1.0, "mm": 1e-3},
     "v": {"rad/s": 1.0, "deg/s": _DEGREE, "rpm": np.pi / 30, "rev/s": 2 * np.pi, "m/s": 1.0, "mm/s": 1e-3},
     "vdot": {"rad/s^2": 1.0, "deg/s^2": _DEGREE, "m/s^2": 1.0, "mm/s^2": 1e-3},
-    "tau": {"N*m": 1.0, "mN*m": 1e-3, "kN*m": 1e3, "N": 1.0, "A": 1.0, "mA": 1e-3, "%": 1.0},
+    "tau": {"N*m": 1.0, "mN*m": 1e-3, "cN*m": 1e-2, "kN*m": 1e3, "N": 1.0, "A": 1.0, "mA": 1e-3, "%": 1.0},
 }
 #: Units of `tau` that are no torque.
 CURRENTS = ("A", "mA")
@@ -32,7 +32,9 @@ _SPELT = {
     "m/s^2": "m/s2, m/s²",
     "N*m": "nm, n*m, n·m, n.m, n m, n-m, 牛米",
     "N": "newton, n",
-    "mN*m": "mnm, mn*m",
+    "mN*m": "mnm, mn*m, mn·m, nmm, n*mm, n·mm, n.mm, n mm, n-mm",
+    "cN*m": "cnm, cn*m, cn·m, ncm, n*cm, n·cm, n.cm, n cm, n-cm",
+    "kN*m": "knm, kn*m, kn·m, kn.m",
     "A": "a, amp, amps, ampere, 安, 安培",
     "mA": "ma",
     "%": "percent",

@@ -67,6 +67,7 @@ class Dynamics:
     def friction(
         self,
         v: ArrayLike,
+        *,
         load: ArrayLike | None = None,
         q: ArrayLike | None = None,
         t: float | Array = math.inf,
