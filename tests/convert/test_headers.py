@@ -114,10 +114,21 @@ def test_a_motors_current_is_measured(tmp_path, log):
 
 @pytest.mark.parametrize(
     ("said", "factor"),
-    [("N*mm", 1e-3), ("Nmm", 1e-3), ("N·mm", 1e-3), ("mNm", 1e-3), ("Ncm", 1e-2), ("cN*m", 1e-2), ("kNm", 1e3)],
+    [
+        ("N*mm", 1e-3),
+        ("Nmm", 1e-3),
+        ("N·mm", 1e-3),
+        ("mNm", 1e-3),
+        ("Ncm", 1e-2),
+        ("cN*m", 1e-2),
+        ("kNm", 1e3),
+    ],
 )
 def test_torques_in_parts_of_a_newton_metre_are_read(tmp_path, log, said, factor):
-    names = ["time [s]", *(f"{x}{j} [{unit}]" for x, unit in (("q", "rad"), ("v", "rad/s")) for j in (1, 2, 3))]
+    names = [
+        "time [s]",
+        *(f"{x}{j} [{unit}]" for x, unit in (("q", "rad"), ("v", "rad/s")) for j in (1, 2, 3)),
+    ]
     names += [f"tau{j} [{said}]" for j in (1, 2, 3)]
     path = tmp_path / "log.csv"
     cells = np.column_stack([log.time, log.q, log.v, log.tau / factor])

@@ -14,26 +14,10 @@ from synthetic import three_axis
 from armloop.data.motion import Motion
 from armloop.diagnosis import pushes
 from armloop.diagnosis.event_size import event_size_error
-from armloop.laws.effects import Estimate, effect
+from armloop.laws.effects import effect
 from armloop.robot.arm import load_arm
 
 Shares = dict[str, float]
-
-
-@pytest.mark.parametrize(
-    ("force", "error", "clear"),
-    [
-        ([-0.3, -5.4, 0.0], [3.6, 25.0, 28.0], False),
-        ([3.0, 4.0, 0.0], [4.9, 4.9, 99.0], True),
-        ([3.0, 4.0, 0.0], [5.1, 5.1, 0.0], False),
-        ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], False),
-    ],
-)
-def test_a_force_is_known_if_it_is_larger_than_its_error_along_it(
-    force: list[float], error: list[float], clear: bool
-) -> None:
-    found: Any = SimpleNamespace(added=SimpleNamespace(parameters={"force": Estimate(force, error, "N")}))
-    assert pushes._is_clear(found) == clear
 
 
 class TestChoice:
@@ -47,9 +31,7 @@ class TestChoice:
         own: Shares | float = 0.9,
         shown: Any = (0, 1),
         tool: float = 0.1,
-        clear: bool = True,
     ) -> tuple[str, list[tuple[str, int | None, float]]] | None:
-        monkeypatch.setattr(pushes, "_is_clear", lambda found: clear)
         asked: list[str] = []
         weights: list[Any] = []
 
@@ -102,7 +84,6 @@ class TestChoice:
         first = [*(f"t{j + 1}" for j in shown), "f0", *links, *(["p1"] if not tool and joints > 3 else [])]
         # where a force may act besides, only its error asks
         of = "" if found is None else found.added.name[0]  # type: ignore[attr-defined]
-        of = of if clear else "f"
         besides = {
             "f": [f"f{k / 2}" for k in range(1, 2 * joints + 1)],
             "p": ["p0.5", "p0.75", "p1.25", "p1.5"],
@@ -114,17 +95,6 @@ class TestChoice:
         assert found.share == shares[found.added.name]  # type: ignore[attr-defined]
         assert found.own == (own if isinstance(own, float) else own[found.added.name])  # type: ignore[attr-defined]
         return found.added.name, [(e.name, e.joint, share) for e, share in found.rivals]  # type: ignore[attr-defined]
-
-    def test_of_a_force_that_nobody_knows_the_torque_is_told(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        shares = {"t1": 0.90, "t2": 0.91, "f0": 0.93, "f5": 0.92}
-        known = self.pushed(monkeypatch, shares)
-        assert known is not None and known[0] == "f0"
-        found = self.pushed(monkeypatch, shares, clear=False)
-        assert found is not None and found[0] == "t2"
-        assert found[1] == [("external_contact", None, 0.93), ("external_torque", 1, 0.90)]
-        # without a torque that explains as much it is a force all the same
-        alone = self.pushed(monkeypatch, {"t1": 0.4, "f0": 0.93}, clear=False)
-        assert alone is not None and alone[0] == "f0"
 
     def test_on_an_arm_of_more_than_three_joints_it_is_a_force_if_that_explains_as_much(
         self, monkeypatch: pytest.MonkeyPatch

@@ -157,21 +157,8 @@ def push(
     # the joints beyond another link feel nothing of what pushes that
     beyond = force if chosen.link in (0, n) or held > most + FREEDOM else None
     # what one joint alone shows may be due to a force on any link from that on
-    alone = {kind.effect.joint: (trial, kind) for trial, kind in equals if kind.effect.joint is not None}
-    force_found = _somewhere(best, anywhere, beyond, min(alone, default=None))
-    if not alone or _is_clear(force_found):
-        return force_found
-    # of a force that nobody knows the torque is all there is to say
-    torque, kind = max(alone.values(), key=lambda one: one[0].share)
-    others = [(effect_, share) for effect_, share in best.rivals if effect_.place != kind.effect.place]
-    return replace(torque, rivals=[(chosen.effect, best.share), *others])
-
-
-def _is_clear(found: Contact) -> bool:
-    """Whether a force is larger than its standard error along its own direction."""
-    force = found.added.parameters["force"]
-    value, error = (np.asarray(x, dtype=float) for x in (force.value, force.std_error))
-    return bool(value @ value > np.linalg.norm(value * error))
+    alone = [kind.effect.joint for _, kind in equals if kind.effect.joint is not None]
+    return _somewhere(best, anywhere, beyond, min(alone, default=None))
 
 
 def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, joint: int) -> Contact | None:
