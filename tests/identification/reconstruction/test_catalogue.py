@@ -235,7 +235,7 @@ class TestSearch:
             periodic=False,
             passive=False,
             shapes=lambda context: shapes,
-            refined=lambda coefficients, shape: shape,
+            fixed_refined=lambda coefficients, shape: shape,
             estimates=lambda arm, coefficients, covariance, shape: (coefficients, shape),
             plausible=lambda arm, estimates: plausible and estimates == ("of it", shapes[-1]),
             label=lambda: name,

@@ -247,19 +247,20 @@ class TestWholeSearch:
         self, asked: dict[str, Any]
     ) -> None:
         own, rng = asked["table"], np.random.default_rng(5)
-        size = {"": 1.0, "zeros": 0.1, "offsets": 0.5}
+        size = {"": 1.0, "zeros": 0.1, "offsets": 0.5, "springs": 0.6}
         asked["left"] = {kind: x * rng.normal(size=own.tau.shape) for kind, x in size.items()}
         found = self.found()
         assert found.found and found.spread.tolist() == [0.1, 0.2] and found.zeros[3].tolist() == [6.0, 7.0]
         assert asked["solved"] == ("zeros", [True] * N)
-        (before, after), (zeros, offsets) = asked["compared"]
-        assert before is asked["left"][""] and after is zeros is asked["left"]["zeros"]
-        assert offsets is asked["left"]["offsets"]
+        (before, after), (zeros, offsets), (same, springs) = asked["compared"]
+        assert before is asked["left"][""] and after is zeros is same is asked["left"]["zeros"]
+        assert offsets is asked["left"]["offsets"] and springs is asked["left"]["springs"]
 
         def rms(x: Array, j: int) -> float:
             return float(np.linalg.norm(x[own.moving[:, j], j]))
 
-        assert list(found.errors) == ["without", "with zeros", "with offsets of the torque instead"]
+        others = ["with offsets of the torque instead", "with springs instead"]
+        assert list(found.errors) == ["without", "with zeros", *others]
         for value, left in zip(found.errors.values(), asked["left"].values(), strict=True):
             shares = [rms(left, j) / rms(own.tau, j) for j in range(JOINTS)]
             assert value == pytest.approx(np.sqrt(shares[0] * shares[1]))
@@ -271,7 +272,7 @@ class TestWholeSearch:
     def test_instants_within_the_memory_of_the_residual_tell_the_same(self, asked: dict[str, Any]) -> None:
         """Of periods of 0.01 to 0.04 s the median is 0.025 s."""
         object.__setattr__(asked["table"], "stride", 4)
-        asked["left"] = dict.fromkeys(("", "zeros", "offsets"), np.ones((N, JOINTS)))
+        asked["left"] = dict.fromkeys(("", "zeros", "offsets", "springs"), np.ones((N, JOINTS)))
         for correlation, repeats in ((0.5, 5.0), (0.05, 1.0)):
             self.found(correlation=correlation)
             assert asked["repeats"] == pytest.approx(repeats)

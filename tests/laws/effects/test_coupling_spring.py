@@ -80,3 +80,22 @@ def test_a_tendon_pulls_and_is_stretched_by_both_joints(of: dict[str, float], po
 def test_the_sentence_says_which_way_it_pulls() -> None:
     assert "pulls q1 - (0.6) q3 towards -0.4 rad with 1.7 rad" in SPRING.sentence(estimates())
     assert "pulls q1 + (0.6) q3" in SPRING.sentence(estimates(ratio=0.6))
+
+
+def test_around_a_ratio_it_is_linear_to_first_order() -> None:
+    here = context(RNG.uniform(-2, 2, (5, 3)))
+
+    def torque(x: np.ndarray, shape: float) -> np.ndarray:
+        k, rest, ratio = SPRING.named(x, shape)
+        return SPRING.torque(here, {"stiffness": k, "rest": rest, "ratio": ratio})
+
+    at = np.array([1.7, 0.0, -0.68])
+    columns = SPRING.fixed_columns(here, -0.6)
+    np.testing.assert_allclose(columns @ at, torque(at, -0.6), atol=1e-12)
+    # what the constant of the other joint changes by with the ratio is of second order where there is none
+    level = np.array([1.7, 0.0, 0.0])
+    for c, h in enumerate(1e-6 * np.eye(3)):
+        slope = (torque(level + h, -0.6) - torque(level - h, -0.6)) / 2e-6
+        np.testing.assert_allclose(columns[:, :, c], slope, atol=1e-7)
+    assert SPRING.fixed_refined(np.array([2.0, 0.2, 9.9]), -0.6) == pytest.approx(-0.5)
+    assert SPRING.refined(np.array([2.0, 0.2, 9.9]), 0.0) == 0.0

@@ -298,8 +298,10 @@ def _best_shape(
         better(shape)
     for _ in range(_REFINEMENTS if best else 0):
         assert best is not None
-        finer = effect.refined(best[1].coefficients, best[0])
-        if finer == best[0] or not better(float(np.clip(finer, min(shapes), max(shapes)))):
+        finer = effect.fixed_refined(best[1].coefficients, best[0])
+        if len(shapes) > 1:
+            finer = float(np.clip(finer, min(shapes), max(shapes)))
+        if finer == best[0] or not better(finer):
             break
     return best
 

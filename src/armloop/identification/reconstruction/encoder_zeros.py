@@ -4,8 +4,9 @@ An incremental encoder counts from where the arm was put when it was switched on
 little elsewhere every time. Every log then belongs to an arm whose gravity acts at slightly other angles, which no model
 of one arm can follow. Here the zeros are regressed beside base parameters and plain friction, each with a normal prior
 whose variance, one a joint, is estimated with them (Laird and Ware, Biometrics 38(4), 1982). They are taken only where
-they predict blocks that they were not regressed on, clearly, and as many offsets of the torque do not predict these clearly
-better: an arm with absolute encoders keeps its own. The blocks that judge the model in the end take no part.
+they predict blocks that they were not regressed on, clearly, and neither as many offsets of the torque nor springs of the
+joints, which no rigid body is and every log has, predict these clearly better: an arm with absolute encoders keeps its own.
+The blocks that judge the model in the end take no part.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import BaseParameters
+from armloop.features.springs import spring_columns
 from armloop.identification.reconstruction.bandwidth import LEAST, Table, table_at
 from armloop.identification.reconstruction.projected import RIDGE
 from armloop.regression.embedded import ITERATIONS
@@ -47,7 +49,7 @@ class EncoderZeros:
     Attributes:
         zeros: (L, n) per log, rad (m); zero throughout where they do not differ.
         spread: (n,) their standard deviation from log to log; zero where they do not differ.
-        errors: mean nRMSE on blocks left out: without zeros, with them, and with offsets of the torque instead.
+        errors: mean nRMSE on blocks left out: without zeros, with them, and with offsets of the torque or springs instead.
     """
 
     zeros: Array
@@ -111,16 +113,21 @@ def encoder_zeros(
         name: float(np.exp(np.mean(np.log(table.sizes(x, table.moving)[slide] / scale[slide]))))
         for name, x in left.items()
     }
-    plain, zeros, offsets = left.values()
+    plain, zeros, *others = left.values()
     less = errors["with zeros"] <= _LESS * errors["without"]
-    if not less or not _clearly(model, plain, zeros) or _clearly(model, zeros, offsets):
+    if not less or not _clearly(model, plain, zeros) or any(_clearly(model, zeros, x) for x in others):
         return none
     found, spread = model.solve("zeros", np.ones(len(table.blocks), dtype=bool))[1:]
     return EncoderZeros(found, spread, errors)
 
 
-#: What is regressed of each log.
-_KINDS = {"without": "", "with zeros": "zeros", "with offsets of the torque instead": "offsets"}
+#: What is regressed of each log, or, of springs, of all.
+_KINDS = {
+    "without": "",
+    "with zeros": "zeros",
+    "with offsets of the torque instead": "offsets",
+    "with springs instead": "springs",
+}
 
 
 def _clearly(model: _Mixed, before: Array, after: Array) -> bool:
@@ -176,6 +183,9 @@ class _Mixed:
 
     def left_out(self, kind: str) -> Array:
         """(N, n) what is left on every other block by what was regressed on the others, both ways round."""
+        if kind == "springs":
+            columns = np.concatenate([self.table.columns, *_springs(self.table.motion.q)], axis=2)
+            return replace(self, table=replace(self.table, columns=columns)).left_out("")
         left = np.zeros_like(self.table.tau)
         odd = (self.table.blocks % 2).astype(bool)
         for judged in (odd, ~odd):
@@ -230,3 +240,8 @@ class _Mixed:
             return np.broadcast_to(np.eye(n), (len(self.table.tau), n, n))
         p = self.slopes.shape[3]
         return np.moveaxis(self.slopes @ theta[:p], 0, 2)
+
+
+def _springs(q: Array) -> tuple[Array, Array]:
+    """Torques of springs of the joints, and between any two of them, at positions q (N, n), and constants: K q − c."""
+    return spring_columns(q), np.broadcast_to(np.eye(q.shape[1]), (*q.shape, q.shape[1]))

@@ -15,6 +15,7 @@ import numpy as np
 from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import BaseParameters, full_columns
+from armloop.features.springs import spring_columns
 from armloop.identification.reconstruction.bandwidth import (
     LEAST,
     Table,
@@ -151,8 +152,8 @@ class PlainFits:
         return replace(self, table=self.table.every(step))
 
     def sprung(self) -> Self:
-        """The same with a spring at every joint."""
-        return self.beside(self.table.motion.q[:, :, None] * np.eye(self.arm.n))
+        """The same with a spring at every joint, and between any two."""
+        return self.beside(spring_columns(self.table.motion.q))
 
     def beside(self, columns: Array) -> Self:
         """The same with more columns (N, n, p), after the others."""

@@ -386,6 +386,10 @@ class Effect(ABC):
         """(N, n, p) of the free parameters alone, on all joints, at a nonlinear parameter that stays as it is."""
         return self.full_columns(context, shape)
 
+    def fixed_refined(self, x: Array, shape: float) -> float:
+        """A better value of the nonlinear parameter, once coefficients x (p,) of :meth:`fixed_columns` were fitted at it."""
+        return self.refined(x, shape)
+
     def on_all_joints(self, columns: Array, joints: int) -> Array:
         """(N, n, p) of columns on the effect's own joint (N, p); others as they are."""
         if columns.ndim == 3:

@@ -61,6 +61,20 @@ class CouplingSpring(Law):
         full[:, j, 3] = full[:, k, 4] = -1.0
         return full
 
+    def fixed_columns(self, context: Context, shape: float) -> Array:
+        """To first order around a ratio: per unit of k, of k times what the ratio is off by, and of k w_0."""
+        j, k = self.indices
+        q = context.motion.q
+        along = q[:, j] + shape * q[:, k]
+        full = np.zeros((len(q), context.arm.n, 3))
+        full[:, j, 0], full[:, k, 0] = along, shape * along
+        full[:, j, 1], full[:, k, 1] = q[:, k], along + shape * q[:, k]
+        full[:, j, 2], full[:, k, 2] = -1.0, -shape
+        return full
+
+    def fixed_refined(self, x: Array, shape: float) -> float:
+        return self.named(x, shape)[2]
+
     def start(self, beta: Array) -> Array:
         return beta[[0, 1, 3]]
 
@@ -77,7 +91,7 @@ class CouplingSpring(Law):
 
     def named(self, x: Array, shape: float) -> tuple[float, ...]:
         own = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
-        return own, float(x[2]) / own, float(x[1]) / own
+        return own, float(x[2]) / own, shape + float(x[1]) / own
 
     def _numbers(self, parameters: Mapping[str, Value]) -> tuple[tuple[float, ...], float]:
         k, rest, ratio = (number(parameters[p.name]) for p in self.parameters)
