@@ -34,6 +34,10 @@ from armloop.util.progress import Progress
 _ROWS, _TRIED, _REFINED = 600, 200, 2
 #: Parts of an arm's reach that an anchor, a point on a link and a slack length usually are: their normal priors.
 _USUAL = np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3, 1.0])
+#: Part of what is usual by which a number that is held may move; a likelihood ratio that is no longer likely.
+_HELD, _UNLIKELY = 1e-9, float(np.exp(-2.0))
+#: Stiffness, slack length, anchor and point, of stiffness and the numbers of a cable.
+_ORDER = [0, 7, *range(1, 7)]
 #: Steps of a refinement, at most.
 _STEPS = 40
 #: A spring that leaves no more than this part less than a cable does not push in the run.
@@ -110,8 +114,9 @@ def find_cable(evidence: Evidence) -> Found | None:
         return None
     folds = evidence.fold[evidence.kept]
     outside = [_Problem.of(evidence, evidence.kept[folds != k]).best()[0] for k in range(FOLDS)]
-    whole = _Problem.of(evidence, evidence.kept, len(evidence.kept))
-    cables = [replace(best, errors=(*whole.errors(best), problem.link_error(best))), *outside]
+    all_rows = _Problem.of(evidence, evidence.kept, len(evidence.kept))
+    errors = problem.profiled(best, all_rows.errors(best))
+    cables = [replace(best, errors=(*errors.tolist(), problem.link_error(best))), *outside]
     shape = Shape(cables[0].key, tuple(cable.key for cable in outside))
     return Found(ElasticCable(cables=cables), shape, 0.0)
 
@@ -146,15 +151,16 @@ class _Problem:
 
     def link_error(self, cable: Cable) -> float:
         """How far the link may be off: the likelihoods of the links, of no more blocks than tell."""
-        blocks = min(len(np.unique(self.block)), TELLING)
-        links = np.array(list(self.lefts))
-        lefts = np.array(list(self.lefts.values()))
-        odds = (lefts / lefts.min()) ** (-blocks / 2)
-        return float(np.sqrt(np.average((links - cable.link) ** 2, weights=odds)))
+        links, lefts = (np.array(list(each)) for each in (self.lefts, self.lefts.values()))
+        return float(np.sqrt(np.average((links - cable.link) ** 2, weights=self._odds(lefts / lefts.min()))))
 
-    def errors(self, cable: Cable) -> tuple[float, ...]:
+    def _odds(self, times: Array | float) -> Array:
+        """Likelihood ratio of what leaves so many times the squares."""
+        return np.asarray(np.power(times, -min(len(np.unique(self.block)), TELLING) / 2))
+
+    def errors(self, cable: Cable) -> Array:
         """Standard errors (8,) of stiffness, slack length, anchor and point; their priors are one more observation."""
-        link, x = cable.link - 1, np.array([*cable.anchor, *cable.attached, cable.slack_length])
+        link, x = cable.link - 1, _numbers(cable)
         torque, step = self._torque(link, x, cable.pushes), 1e-4 * self.reach
         k = self._stiffness(torque)
         ends = [[self._torque(link, x + s * h, cable.pushes) for s in (1, -1)] for h in step * np.eye(7)]
@@ -169,8 +175,24 @@ class _Problem:
             np.r_[left, -prior[:, 1:] @ x],
             np.r_[block, block.max() + 1 + np.arange(7)],
         )
-        size = np.sqrt(np.maximum(np.diag(spread), 0.0))
-        return float(size[0]), float(size[7]), *size[1:7].tolist()
+        return np.sqrt(np.maximum(np.diag(spread), 0.0))[_ORDER]
+
+    def profiled(self, cable: Cable, errors: Array) -> Array:
+        """Standard errors (8,) that hold what each changes by where a coordinate of anchor or point is off by its own.
+
+        Coordinates that a run hardly shows bend the others: a slack length hangs on what lies across the cable by a square.
+        """
+        link, x, found = cable.link - 1, _numbers(cable), errors.copy()
+        best = self._squares(link, x, cable.pushes)
+        at = np.r_[self._stiffness(self._torque(link, x, cable.pushes)), x][_ORDER]
+        for i, error in enumerate(errors[2:].tolist()):
+            for off in (error, -error):
+                left, y = self._refined(link, x + off * np.eye(7)[i], cable.pushes, i)
+                if self._odds(left / best) < _UNLIKELY:
+                    continue
+                k = self._stiffness(self._torque(link, y, cable.pushes))
+                found = np.maximum(found, np.abs(np.r_[k, y][_ORDER] - at))
+        return found
 
     def _of_link(self, link: int) -> tuple[float, Cable]:
         """The best cable to a link (from 0), and the squares that it leaves."""
@@ -194,16 +216,23 @@ class _Problem:
             starts.append(np.array([*anchor, *point, slack]))
         return starts
 
-    def _refined(self, link: int, x: Array, pushes: bool = False) -> tuple[float, Array]:
-        """Squares left, and where the cable runs that a start leads to, in parts of what is usual."""
+    def _refined(
+        self, link: int, x: Array, pushes: bool = False, held: int | None = None
+    ) -> tuple[float, Array]:
+        """Squares left, and where the cable runs that a start leads to, in parts of what is usual.
+
+        Args:
+            held: which of its numbers stays as it is.
+        """
         usual = _USUAL * self.reach
 
         def left(parts: Array) -> Array:
             return np.concatenate([self._left(link, usual * parts, pushes).ravel(), parts])
 
-        free = np.full(7, np.inf)
-        lower = np.array([*-free[:6], 0.0])
-        found = least_squares(left, x / usual, bounds=(lower, free), max_nfev=_STEPS)
+        lower, upper = np.array([*np.full(6, -np.inf), 0.0]), np.full(7, np.inf)
+        if held is not None:
+            lower[held], upper[held] = x[held] / usual[held] + np.array([-_HELD, _HELD])
+        found = least_squares(left, x / usual, bounds=(lower, upper), max_nfev=_STEPS)
         return self._squares(link, usual * found.x, pushes), usual * found.x
 
     def _squares(self, link: int, x: Array, pushes: bool = False) -> float:
@@ -225,3 +254,8 @@ class _Problem:
         stretch = length - x[6] if pushes else np.maximum(length - x[6], 0.0)
         force = (stretch / length)[:, None] * d
         return np.asarray(np.einsum("kfn,kf->kn", self.poses.jacobian(link, p), force) * self.weight)
+
+
+def _numbers(cable: Cable) -> Array:
+    """(7,) anchor, point and slack length."""
+    return np.array([*cable.anchor, *cable.attached, cable.slack_length])
