@@ -140,6 +140,16 @@ def test_a_spring_that_pushes_while_it_is_short_is_told_from_a_cable(model: Reco
         )
 
 
+def test_of_two_joints_a_family_of_cables_is_alike_and_the_errors_hold_it(model: ReconstructedModel) -> None:
+    """What link 2 feels two joints show: where its cable runs nobody can tell to a centimetre."""
+    found = cables.find_cable(evidence(model, lambda m: 5.0 * pull(m, 2)))
+    assert found is not None and isinstance(found.effect, ElasticCable)
+    cable = found.effect.cables[found.shape.final]
+    errors = np.array(cable.errors[1:5])
+    off = np.abs(np.array([cable.slack_length, *cable.anchor]) - [SLACK, *ANCHOR])
+    assert (off < 3 * errors).all() and errors.max() > 0.05
+
+
 def test_what_no_cable_explains_has_none(model: ReconstructedModel) -> None:
     assert cables.find_cable(evidence(model, lambda m: on_joint(m, 2, 0.6 * m.v[:, 1]))) is None
 

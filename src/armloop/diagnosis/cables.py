@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -34,8 +35,8 @@ from armloop.util.progress import Progress
 _ROWS, _TRIED, _REFINED = 600, 200, 2
 #: Parts of an arm's reach that an anchor, a point on a link and a slack length usually are: their normal priors.
 _USUAL = np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3, 1.0])
-#: Part of what is usual by which a number that is held may move; a likelihood ratio that is no longer likely.
-_HELD, _UNLIKELY = 1e-9, float(np.exp(-2.0))
+#: Part of what is usual by which a number that is held may move; a deviance, of two standard errors, no longer likely.
+_HELD, _UNLIKELY = 1e-9, 4.0
 #: Stiffness, slack length, anchor and point, of stiffness and the numbers of a cable.
 _ORDER = [0, 7, *range(1, 7)]
 #: Steps of a refinement, at most.
@@ -115,8 +116,8 @@ def find_cable(evidence: Evidence) -> Found | None:
     folds = evidence.fold[evidence.kept]
     outside = [_Problem.of(evidence, evidence.kept[folds != k]).best()[0] for k in range(FOLDS)]
     all_rows = _Problem.of(evidence, evidence.kept, len(evidence.kept))
-    errors = problem.profiled(best, all_rows.errors(best))
-    cables = [replace(best, errors=(*errors.tolist(), problem.link_error(best))), *outside]
+    errors = problem.over_links(best, problem.profiled(best, *all_rows.errors(best)))
+    cables = [replace(best, errors=tuple(errors.tolist())), *outside]
     shape = Shape(cables[0].key, tuple(cable.key for cable in outside))
     return Found(ElasticCable(cables=cables), shape, 0.0)
 
@@ -130,7 +131,7 @@ class _Problem:
     y: Array
     block: Index
     reach: float
-    lefts: dict[int, float]
+    found: list[tuple[float, Cable]]
 
     @staticmethod
     def of(evidence: Evidence, rows: Index, most: int = _ROWS) -> _Problem:
@@ -140,26 +141,40 @@ class _Problem:
         poses = LinkPoses.of(evidence.model.arm, evidence.samples.motion.q[rows])
         reach = float(max(np.linalg.norm(p - poses.origins[0], axis=1).max() for p in poses.p))
         y = evidence.residual([])[rows] * weight
-        return _Problem(poses, weight, y, evidence.blocks[rows], max(reach, 0.1), {})
+        return _Problem(poses, weight, y, evidence.blocks[rows], max(reach, 0.1), [])
 
     def best(self) -> tuple[Cable, float]:
         """The cable that leaves least, and the part of the squares that it explains."""
-        found = [self._of_link(link) for link in range(len(self.poses.p))]
-        left, cable = min(found, key=lambda one: one[0])
-        self.lefts.update({each.link: squares for squares, each in found})
+        self.found[:] = [self._of_link(link) for link in range(len(self.poses.p))]
+        left, cable = min(self.found, key=lambda one: one[0])
         return cable, 1 - left / max(float((self.y**2).sum()), TINY)
 
-    def link_error(self, cable: Cable) -> float:
-        """How far the link may be off: the likelihoods of the links, of no more blocks than tell."""
-        links, lefts = (np.array(list(each)) for each in (self.lefts, self.lefts.values()))
-        return float(np.sqrt(np.average((links - cable.link) ** 2, weights=self._odds(lefts / lefts.min()))))
+    def over_links(self, cable: Cable, errors: Array) -> Array:
+        """Standard errors (9,), the link's last, that hold the best cables to all links, by their likelihoods.
 
-    def _odds(self, times: Array | float) -> Array:
-        """Likelihood ratio of what leaves so many times the squares."""
-        return np.asarray(np.power(times, -min(len(np.unique(self.block)), TELLING) / 2))
+        No more blocks count than tell.
+        """
+        blocks = min(len(np.unique(self.block)), TELLING)
+        lefts = np.array([left for left, _ in self.found])
+        odds = (lefts / lefts.min()) ** (-blocks / 2)
+        odds[-2 * np.log(odds) > _UNLIKELY] = 0.0
+        each = np.array([[*self._stated(other), other.link] for _, other in self.found])
+        off = np.sqrt(odds @ (each - [*self._stated(cable), cable.link]) ** 2 / odds.sum())
+        off[5:8] = 0.0  # of a point in the frame of another link
+        return np.hypot([*errors, 0.0], off)
 
-    def errors(self, cable: Cable) -> Array:
-        """Standard errors (8,) of stiffness, slack length, anchor and point; their priors are one more observation."""
+    def _stated(self, cable: Cable) -> Array:
+        """(8,) stiffness, slack length, anchor and point."""
+        x = _numbers(cable)
+        return np.r_[self._stiffness(self._torque(cable.link - 1, x, cable.pushes)), x][_ORDER]
+
+    def errors(self, cable: Cable) -> tuple[Array, float]:
+        """Standard errors (8,) of stiffness, slack length, anchor and point; their priors are one more observation.
+
+        Returns:
+            The errors, and the number of independent torques: by so much more do errors of a block vary together (design
+            effect; Kish, Survey Sampling, 1965).
+        """
         link, x = cable.link - 1, _numbers(cable)
         torque, step = self._torque(link, x, cable.pushes), 1e-4 * self.reach
         k = self._stiffness(torque)
@@ -170,28 +185,37 @@ class _Problem:
         left = (self.y - k * torque)[counts]
         block = np.broadcast_to(self.block[:, None], counts.shape)[counts]
         prior = np.hstack([np.zeros((7, 1)), np.diag(1 / (_USUAL * self.reach))])
-        spread = clustered_covariance(
-            np.vstack([X, prior]),
-            np.r_[left, -prior[:, 1:] @ x],
-            np.r_[block, block.max() + 1 + np.arange(7)],
-        )
-        return np.sqrt(np.maximum(np.diag(spread), 0.0))[_ORDER]
+        X, left = np.vstack([X, prior]), np.r_[left, -prior[:, 1:] @ x]
+        spread = clustered_covariance(X, left, np.r_[block, block.max() + 1 + np.arange(7)])
+        alone = np.diag(np.linalg.pinv(X.T @ X)) * float(left @ left) / len(left)
+        effect = float(np.median(np.diag(spread) / np.maximum(alone, TINY)))
+        errors = np.sqrt(np.maximum(np.diag(spread), 0.0))[_ORDER]
+        return errors, len(left) / max(effect, 1.0)
 
-    def profiled(self, cable: Cable, errors: Array) -> Array:
-        """Standard errors (8,) that hold what each changes by where a coordinate of anchor or point is off by its own.
+    def profiled(self, cable: Cable, errors: Array, count: float) -> Array:
+        """Standard errors (8,) by profile likelihood along each coordinate of anchor and point, where these are larger.
 
-        Coordinates that a run hardly shows bend the others: a slack length hangs on what lies across the cable by a square.
+        Coordinates that a run hardly shows bend the others, far beyond what holds at the best: a slack length hangs on what
+        lies across the cable by a square, and an arm of few joints is met by a whole family of cables.
+
+        Args:
+            errors: (8,) of the best, and ``count`` of independent torques.
         """
         link, x, found = cable.link - 1, _numbers(cable), errors.copy()
         best = self._squares(link, x, cable.pushes)
-        at = np.r_[self._stiffness(self._torque(link, x, cable.pushes)), x][_ORDER]
-        for i, error in enumerate(errors[2:].tolist()):
-            for off in (error, -error):
-                left, y = self._refined(link, x + off * np.eye(7)[i], cable.pushes, i)
-                if self._odds(left / best) < _UNLIKELY:
-                    continue
+        at = self._stated(cable)
+        usual = _USUAL * self.reach
+        for i, way in product(range(6), (1.0, -1.0)):
+            step, y = way * errors[2 + i], x
+            while abs(y[i] - x[i]) < usual[i]:
+                left, y = self._refined(link, y + step * np.eye(7)[i], cable.pushes, i)
+                deviance = count * (left / best - 1)
+                if deviance > _UNLIKELY:
+                    break
                 k = self._stiffness(self._torque(link, y, cable.pushes))
-                found = np.maximum(found, np.abs(np.r_[k, y][_ORDER] - at))
+                off = np.abs(np.r_[k, y][_ORDER] - at)
+                found = np.maximum(found, off / max(np.sqrt(max(deviance, 0.0)), 1.0))
+                step *= 2
         return found
 
     def _of_link(self, link: int) -> tuple[float, Cable]:
