@@ -156,8 +156,8 @@ class _Problem:
         """
         blocks = min(len(np.unique(self.block)), TELLING)
         lefts = np.array([left for left, _ in self.found])
-        odds = (lefts / lefts.min()) ** (-blocks / 2)
-        odds[-2 * np.log(odds) > _UNLIKELY] = 0.0
+        deviance = blocks * np.log(lefts / lefts.min())
+        odds = np.where(deviance > _UNLIKELY, 0.0, np.exp(-deviance / 2))
         each = np.array([[*self._stated(other), other.link] for _, other in self.found])
         off = np.sqrt(odds @ (each - [*self._stated(cable), cable.link]) ** 2 / odds.sum())
         off[5:8] = 0.0  # of a point in the frame of another link
