@@ -177,3 +177,76 @@ def test_it_is_asked_of_what_it_may_look_like(
         outcome=outcome, contacts=["push"] * events, unlisted="law" if unlisted else None
     )
     assert cables._is_asked(account) == asked
+
+
+def of_cables(model: ReconstructedModel, law: Any) -> tuple[cables._Problem, cables.Cable]:
+    whole = evidence(model, law)
+    problem = cables._Problem.of(whole, whole.kept)
+    return problem, problem.best()[0]
+
+
+def test_a_cable_that_is_never_slack_is_no_spring_that_pushes(model: ReconstructedModel) -> None:
+    def taut(motion: Motion) -> np.ndarray:
+        poses = LinkPoses.of(three_axis(), motion.q)
+        point = poses.p[2] + poses.R[2] @ ATTACHED
+        return np.einsum("kfn,kf->kn", poses.jacobian(2, point), 5.0 * (point - ANCHOR))
+
+    problem, cable = of_cables(model, taut)
+    assert not cable.pushes and cable.slack_length < 0.05
+    x = cables._numbers(cable)
+    assert problem._squares(2, x, True) == pytest.approx(problem._squares(2, x, False))
+
+
+def test_errors_follow_the_likelihood_however_small_they_begin(model: ReconstructedModel) -> None:
+    problem, cable = of_cables(model, pull)
+    errors, count = problem.errors(cable)
+    assert count < np.count_nonzero(problem.weight)
+    found = problem.profiled(cable, 0.01 * errors, count)
+    assert (found[2:] > 0.3 * errors[2:]).all() and (found < 5 * errors + 0.01).all()
+
+
+def test_what_may_run_to_another_link_is_as_uncertain_as_they_are_apart(model: ReconstructedModel) -> None:
+    problem, cable = of_cables(model, pull)
+    left = min(each for each, _ in problem.found)
+    other = replace(cable, link=2, slack_length=cable.slack_length + 0.2, attached=(9.0, 9.0, 9.0))
+    for times, alike in ((1.01, True), (2.0, False)):
+        problem.found[:] = [(left, cable), (times * left, other)]
+        error = problem.over_links(cable, np.full(8, 1e-3))
+        assert (error[8] > 0.4) == alike and (error[1] > 0.08) == alike
+        # a point in the frame of another link is another point
+        assert (error[5:8] == 1e-3).all()
+
+
+@pytest.mark.parametrize(
+    ("likelier", "named", "costly", "taken"),
+    [
+        ((True, True), True, False, True),
+        ((False, True), True, False, False),
+        ((True, False), True, False, False),
+        ((True, True), False, False, False),
+        ((True, True), True, True, False),
+    ],
+)
+def test_it_is_taken_if_the_run_is_likelier_with_it_and_no_joint_pays(
+    likelier: tuple[bool, bool], named: bool, costly: bool, taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = np.ones((2, 2), dtype=bool)
+    whole: Any = SimpleNamespace(rows=rows, only=lambda rows: None)
+    made = SimpleNamespace(added=lambda: ["cable"], effects=[ElasticCable()] if named else [])
+    more: Any = SimpleNamespace(outcome=SimpleNamespace(after=made), whole=whole)
+    account: Any = SimpleNamespace(whole=whole, remaining=lambda: "left")
+    asked = iter(likelier)
+    for name, answer in {
+        "_is_asked": True,
+        "without": SimpleNamespace(rows=rows),
+        "find_cable": "cable",
+        "posterior": 0.0,
+        "with_account": SimpleNamespace(fit=made),
+        "_alone": "alone",
+        "account_beside": SimpleNamespace(evidence=SimpleNamespace(rows=rows)),
+        "merged": more,
+        "at_the_cost_of_others": costly,
+    }.items():
+        monkeypatch.setattr(cables, name, lambda *given, answer=answer: answer)
+    monkeypatch.setattr(cables, "_is_likelier", lambda *given: next(asked))
+    assert (cables.account_with_cable(whole, account, lambda text: None, 1) is more) == taken
