@@ -357,11 +357,11 @@ class TestWhatIsLeft:
             stacked = SimpleNamespace(joint=joint, block=block)
             return SimpleNamespace(stacked=stacked, held_out=held_out, score=score)
 
-        def left(after: Any, before: float = 10.0) -> int | None:
+        def left(after: Any, before: float = 10.0, **of: Any) -> int | None:
             # a joint's energy before any effect: that of a constant residual
             was = fit(*(np.full((after.stacked.joint == j).sum(), before) for j in (0, 1)))
             outcome: Any = SimpleNamespace(before=was, after=after)
-            return unlisted._left_over(evidence, outcome)
+            return unlisted._left_over(evidence, outcome, **of)
 
         assert left(fit(np.full(50, 2.01), np.full(50, 1.99))) == 0
         assert left(fit(np.full(50, 1.99), np.full(50, 2.5))) == 1
@@ -381,6 +381,10 @@ class TestWhatIsLeft:
         # less than three hundredths of what there was is what effects leave
         assert left(fit(np.full(50, 3.0), np.full(50, 1.0)), np.sqrt(9 / 0.031)) == 0
         assert left(fit(np.full(50, 3.0), np.full(50, 1.0)), np.sqrt(9 / 0.029)) is None
+        # but for a joint that is in a law, and one that has its law already
+        assert left(fit(np.full(50, 3.0), np.full(50, 1.0)), np.sqrt(9 / 0.029), partners=[0]) == 0
+        assert left(fit(np.full(50, 3.0), np.full(50, 1.0)), np.sqrt(9 / 0.029), partners=[1]) is None
+        assert left(fit(np.full(50, 2.1), np.full(50, 2.5)), but={1}) == 0
         # one or two blocks are an event
         for high, real in ((20, None), (30, 0)):
             event = np.zeros(50)

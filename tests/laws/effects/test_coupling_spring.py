@@ -99,3 +99,10 @@ def test_around_a_ratio_it_is_linear_to_first_order() -> None:
         np.testing.assert_allclose(columns[:, :, c], slope, atol=1e-7)
     assert SPRING.fixed_refined(np.array([2.0, 0.2, 9.9]), -0.6) == pytest.approx(-0.5)
     assert SPRING.refined(np.array([2.0, 0.2, 9.9]), 0.0) == 0.0
+
+
+def test_it_is_there_by_its_stiffness_not_by_its_constant() -> None:
+    """Of the free parameters k, k r and k w_0 the last is an offset of both torques by itself."""
+    kept = np.array([0.0, 0.0, 0.5])
+    kept[len(kept) - SPRING.nested :] = 0.0
+    assert not kept.any() and SPRING.complexity == 3

@@ -105,3 +105,11 @@ def test_it_pushes_or_it_does_not(pushes: float, right: bool) -> None:
     assert (ElasticCable.fault({**P, "pushes": pushes}) == "") == right
     said = {key: value for key, value in P.items() if key != "pushes"}
     assert ElasticCable.fault(said) == "" and EFFECTS["elastic_cable"].parameters[-1].default == 0.0
+
+
+def test_where_the_point_is_at_the_anchor_there_is_no_torque_and_no_fault() -> None:
+    q = np.zeros((1, 3))
+    poses = LinkPoses.of(an_arm(), q)
+    at = (poses.p[1] + poses.R[1] @ np.array([0.1, -0.05, 0.02]))[0].tolist()
+    tau = ElasticCable().torque(context(an_arm(), q), {**P, "slack_length": 0.0, "anchor": at})
+    np.testing.assert_allclose(tau, 0.0, atol=1e-6)
