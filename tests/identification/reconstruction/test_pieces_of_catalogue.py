@@ -141,3 +141,19 @@ def test_of_two_motors_each_has_friction_and_inertia_of_its_own(
     nothing: Any = None
     assert catalogue._two_motors(nothing, law, [1.0, -1.0, 2.0][:shapes], nothing, nothing) is None
     assert calls == [[1.0, -1.0]] * asked
+
+
+@pytest.mark.parametrize(("shapes", "best"), [([1.0, 2.0], 2.0), ([1.0], 4.0)])
+def test_a_shape_is_refined_within_those_tried_or_freely_from_one(shapes: list[float], best: float) -> None:
+    """Whatever shape was fitted, the better one is 4, and what is removed grows with it."""
+    law: Any = SimpleNamespace(
+        fixed_columns=lambda context, shape: np.full((1, 1, 1), shape), fixed_refined=lambda x, shape: 4.0
+    )
+    own: Any = SimpleNamespace(
+        trial=lambda columns, new, worth: SimpleNamespace(removed=float(columns[0, 0, 0]), coefficients=None)
+    )
+    still = Motion(np.zeros(1), *np.zeros((3, 1, 1)), np.array([0]))
+    samples = Samples(still, np.zeros((1, 1)), np.ones((1, 1), dtype=bool), 0.0)
+    nothing: Any = None
+    found = catalogue._best_shape(own, law, shapes, nothing, samples)
+    assert found is not None and found[0] == best
