@@ -45,6 +45,8 @@ _OF_A_RUN = ("payload",)
 _MOST = 6
 #: A shape is refined to first order so many times at most.
 _REFINEMENTS = 4
+#: A shape that changes by less than this part stays as it is.
+_STILL = 1e-3
 #: More shapes than these are not tried one by one.
 _FEW = 8
 
@@ -258,6 +260,27 @@ def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, sa
     return laws
 
 
+def reshaped(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, samples: Samples) -> Laws:
+    """The laws with shapes found anew to first order (Gauss-Newton) beside the others and the friction chosen beside them.
+
+    Of a law that is far from its shape the other parameters are not what they are there.
+    """
+    chosen, context = list(laws.chosen), Context(arm, samples.motion, period=samples.period)
+    for k, law in enumerate(laws.chosen):
+        shapes = list(law.effect.shapes(context))
+        if law.kept or law.effect.periodic:
+            continue
+        own = bench(chosen[:k] + chosen[k + 1 :])
+        for _ in range(_REFINEMENTS):
+            trial = own.trial(Laws([law]).columns(arm, samples))
+            finer = law.shape if trial is None else _finer(law.effect, trial, law.shape, shapes)
+            if np.isclose(finer, law.shape, rtol=_STILL):
+                break
+            law = replace(law, shape=finer)
+        chosen[k] = law
+    return replace(laws, chosen=chosen)
+
+
 def is_worth(trial: Trial, tried: int) -> bool:
     """Whether a law removes enough, and more than chance would for the best of so many, by blocks and in every fold."""
     # of a single block it is no number, which nothing exceeds
@@ -298,12 +321,16 @@ def _best_shape(
         better(shape)
     for _ in range(_REFINEMENTS if best else 0):
         assert best is not None
-        finer = effect.fixed_refined(best[1].coefficients, best[0])
-        if len(shapes) > 1:
-            finer = float(np.clip(finer, min(shapes), max(shapes)))
+        finer = _finer(effect, best[1], best[0], shapes)
         if finer == best[0] or not better(finer):
             break
     return best
+
+
+def _finer(effect: Effect, trial: Trial, shape: float, shapes: Sequence[float]) -> float:
+    """A better shape to first order, within those that are tried if these are several."""
+    finer = effect.fixed_refined(trial.coefficients, shape)
+    return float(np.clip(finer, min(shapes), max(shapes))) if len(shapes) > 1 else finer
 
 
 def _two_motors(

@@ -10,7 +10,7 @@ import numpy as np
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers
 from armloop.data.motion import Samples
 from armloop.features.lagrangian import constant_weights
-from armloop.identification.reconstruction.catalogue import Law, Laws, pruned, search
+from armloop.identification.reconstruction.catalogue import Law, Laws, pruned, reshaped, search
 from armloop.identification.reconstruction.design import Design
 from armloop.identification.reconstruction.friction_selection import FrictionSelection, select_friction
 from armloop.identification.reconstruction.inner_folds import inner_folds
@@ -67,6 +67,9 @@ class Fitting:
                 break
             laws = fewer
         if laws.chosen:
+            finer = reshaped(laws, self._bench(selection), self._arm, samples)
+            if [law.shape for law in finer.chosen] != [law.shape for law in laws.chosen]:
+                laws, selection = finer, self._beside(finer, selection)
             trial = self._bench(selection)([]).trial(laws.columns(self._arm, samples))
             assert trial is not None
             self.covariance = trial.covariance
