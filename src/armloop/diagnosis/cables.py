@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -131,7 +132,6 @@ class _Problem:
     y: Array
     block: Index
     reach: float
-    found: list[tuple[float, Cable]]
 
     @staticmethod
     def of(evidence: Evidence, rows: Index, most: int = _ROWS) -> _Problem:
@@ -141,11 +141,15 @@ class _Problem:
         poses = LinkPoses.of(evidence.model.arm, evidence.samples.motion.q[rows])
         reach = float(max(np.linalg.norm(p - poses.origins[0], axis=1).max() for p in poses.p))
         y = evidence.residual([])[rows] * weight
-        return _Problem(poses, weight, y, evidence.blocks[rows], max(reach, 0.1), [])
+        return _Problem(poses, weight, y, evidence.blocks[rows], max(reach, 0.1))
+
+    @cached_property
+    def found(self) -> list[tuple[float, Cable]]:
+        """Per link the best cable to it, after the squares that it leaves."""
+        return [self._of_link(link) for link in range(len(self.poses.p))]
 
     def best(self) -> tuple[Cable, float]:
         """The cable that leaves least, and the part of the squares that it explains."""
-        self.found[:] = [self._of_link(link) for link in range(len(self.poses.p))]
         left, cable = min(self.found, key=lambda one: one[0])
         return cable, 1 - left / max(float((self.y**2).sum()), TINY)
 

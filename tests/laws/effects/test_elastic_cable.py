@@ -68,9 +68,13 @@ def test_its_column_is_the_torque_of_a_unit_stiffness_where_it_was_found_to_run(
 def test_it_is_stated_with_the_errors_of_where_it_runs() -> None:
     kind = ElasticCable(cables=[CABLE])
     found = kind.estimates(an_arm(), np.array([40.0]), np.zeros((1, 1)), CABLE.key)
-    assert {key: e.value for key, e in found.items()} == P
-    errors = np.hstack([found[key].std_error for key in P])
-    np.testing.assert_allclose(errors, [*(0.01 * np.arange(1, 10)), 0.0])
+    assert {**{key: e.value for key, e in found.items()}, "pushes": 0.0} == P and "pushes" not in found
+    errors = np.hstack([e.std_error for e in found.values()])
+    np.testing.assert_allclose(errors, 0.01 * np.arange(1, 10))
+    pushing = ElasticCable(cables=[replace(CABLE, pushes=True)])
+    (key,) = pushing.cables
+    stated = pushing.estimates(an_arm(), np.array([40.0]), np.zeros((1, 1)), key)
+    assert (stated["pushes"].value, stated["pushes"].std_error) == (1.0, 0.0)
     assert (
         "pulls link 2 ± 0.1 at (0.100 ± 0.060, -0.050 ± 0.070, 0.020 ± 0.080) m in its frame towards (0.400 ± 0.030, "
         "0.500 ± 0.040, 0.600 ± 0.050) m in the base frame with 40.000 ± 0.010 N/m, once it is longer than 0.550 ± 0.020 m"

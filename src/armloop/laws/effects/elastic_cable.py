@@ -94,9 +94,11 @@ class ElasticCable(Effect):
         values = {"stiffness": float(x[0]), **_where(cable)}
         each = iter([*cable.errors, 0.0])
         errors = [[next(each) for _ in range(3)] if p.size == 3 else next(each) for p in self.parameters]
+        # of a cable, which does not push, nothing is said of pushing
         return {
             p.name: Estimate(values[p.name], error, p.unit)
             for p, error in zip(self.parameters, errors, strict=True)
+            if p.name != "pushes" or cable.pushes
         }
 
     def of_state(self, arm: Arm, parameters: Mapping[str, Value]) -> StateLaw:
