@@ -22,6 +22,7 @@ from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.outcomes import Found, Outcome
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import hypotheses
+from armloop.laws.effects.coulomb_friction import CoulombFriction
 from armloop.laws.effects.elastic_cable import ElasticCable
 from armloop.laws.effects.joint_spring import JointSpring
 from armloop.model import AddedEffect, ReconstructedModel
@@ -130,6 +131,26 @@ def test_where_it_runs_is_found_without_the_fold_that_is_judged(model: Reconstru
         assert other is None or other.shape.without[k] == found.shape.without[k]
 
 
+def test_what_is_there_beside_it_is_fitted_without_the_fold_too(model: ReconstructedModel) -> None:
+    whole = evidence(model, both)
+    cable = cables.find_cable(whole)
+    assert cable is not None
+    friction = CoulombFriction(2)
+    known = Known.of(whole, [friction], [Shape.fixed(0.0)]).fit
+    outcome = Outcome([Found(friction, Shape.fixed(0.0), 0.5)], Known.of(whole).fit, known)
+    account = Account(whole, [], whole, outcome, None)
+
+    def levels(run: Evidence) -> list[Any]:
+        return [each[0].parameters["level"].value for each in cables._beside(run, cable, account)]
+
+    first = levels(whole)
+    assert 0.15 < first[0] < 0.25
+    for k in (0, 1):
+        tau = whole.samples.tau + 3.0 * (whole.fold == k)[:, None] * np.sign(whole.samples.motion.v)
+        spoilt = levels(replace(whole, samples=replace(whole.samples, tau=tau)))
+        assert spoilt[1 + k] == first[1 + k] and spoilt[0] > first[0] + 0.5
+
+
 def test_a_spring_that_pushes_while_it_is_short_is_told_from_a_cable(model: ReconstructedModel) -> None:
     for least, pushes in ((-np.inf, True), (0.0, False)):
         found = cables.find_cable(evidence(model, lambda m, least=least: pull(m, least=least)))
@@ -181,7 +202,7 @@ def test_it_is_asked_of_what_it_may_look_like(
 
 def of_cables(model: ReconstructedModel, law: Any) -> tuple[cables._Problem, cables.Cable]:
     whole = evidence(model, law)
-    problem = cables._Problem.of(whole, whole.kept)
+    problem = cables._Problem.of(whole, whole.kept, whole.residual([]))
     return problem, problem.best()[0]
 
 
@@ -242,8 +263,9 @@ def test_it_is_taken_if_the_run_is_likelier_with_it_and_no_joint_pays(
         "find_cable": "cable",
         "posterior": 0.0,
         "with_account": SimpleNamespace(fit=made),
+        "_beside": [[], [], []],
         "_alone": "alone",
-        "account_beside": SimpleNamespace(evidence=SimpleNamespace(rows=rows)),
+        "account_beside": SimpleNamespace(outcome=SimpleNamespace(after=SimpleNamespace(effects=[]))),
         "merged": more,
         "at_the_cost_of_others": costly,
     }.items():

@@ -27,6 +27,7 @@ from armloop.diagnosis.outcomes import Found, Outcome
 from armloop.diagnosis.search import ROUNDS, TELLING
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects.elastic_cable import Cable, ElasticCable
+from armloop.model import AddedEffect
 from armloop.regression.clustered import clustered_covariance
 from armloop.robot.kinematics import LinkPoses
 from armloop.util.arrays import TINY, Array, Index, Mask
@@ -71,8 +72,11 @@ def account_with_cable(
     nowhere = np.zeros_like(whole.rows)
     other = account_beside(whole, known, nowhere, progress, jobs)
     for _ in range(ROUNDS):
-        others = with_account(whole.only(other.evidence.rows), [cable], other).fit.added()[1:]
-        again = find_cable(without(known_by(whole, others), other.contacts)) if others else None
+        if not other.outcome.after.effects:
+            break
+        others = _beside(whole, cable, other)
+        evidence = without(known_by(whole, others[0]), other.contacts)
+        again = find_cable(evidence, [whole.left_by(whole.model.with_effects(each)) for each in others])
         if again is None:
             break
         before, cable = {effect.place for effect in other.outcome.after.effects}, again
@@ -101,22 +105,37 @@ def _alone(account: Account, evidence: Evidence, cable: Found, known: Known) -> 
     return replace(account, contacts=[], evidence=evidence, outcome=outcome, unlisted=None, further=())
 
 
+def _beside(whole: Evidence, cable: Found, other: Account) -> list[list[AddedEffect]]:
+    """The effects of an account as they are beside a cable: by all of the run, and by what is outside of each fold."""
+    after, rows = other.outcome.after, other.evidence.rows
+    effects, shapes = [cable.effect, *after.effects], [cable.shape, *after.shapes]
+    found = [Known.of(whole.only(rows), effects, shapes)]
+    for k in range(FOLDS):
+        outside = whole.only(rows & (whole.fold != k)[:, None])
+        found.append(Known.of(outside, effects, [Shape.fixed(shape.without[k]) for shape in shapes]))
+    return [known.fit.added()[1:] for known in found]
+
+
 def _is_likelier(account: Account, rows: Mask, least: float) -> bool:
     return posterior(account, account.remaining(), rows) > least
 
 
-def find_cable(evidence: Evidence) -> Found | None:
+def find_cable(evidence: Evidence, left: Sequence[Array] = ()) -> Found | None:
     """The cable that explains most of a residual; of each fold where it runs on the samples outside of it.
 
     None where none explains much.
+
+    Args:
+        left: (N, n) the residual, and of each fold that of effects fitted outside of it, N·m (N); the model's by default.
     """
-    problem = _Problem.of(evidence, evidence.kept)
+    whole_left, *lefts = left or [evidence.residual([])] * (FOLDS + 1)
+    problem = _Problem.of(evidence, evidence.kept, whole_left)
     best, share = problem.best()
     if share < _LEAST:
         return None
     folds = evidence.fold[evidence.kept]
-    outside = [_Problem.of(evidence, evidence.kept[folds != k]).best()[0] for k in range(FOLDS)]
-    all_rows = _Problem.of(evidence, evidence.kept, len(evidence.kept))
+    outside = [_Problem.of(evidence, evidence.kept[folds != k], x).best()[0] for k, x in enumerate(lefts)]
+    all_rows = _Problem.of(evidence, evidence.kept, whole_left, len(evidence.kept))
     errors = problem.over_links(best, problem.profiled(best, *all_rows.errors(best)))
     cables = [replace(best, errors=tuple(errors.tolist())), *outside]
     shape = Shape(cables[0].key, tuple(cable.key for cable in outside))
@@ -134,13 +153,13 @@ class _Problem:
     reach: float
 
     @staticmethod
-    def of(evidence: Evidence, rows: Index, most: int = _ROWS) -> _Problem:
-        """Of samples ``rows``, no more than so many of them."""
+    def of(evidence: Evidence, rows: Index, left: Array, most: int = _ROWS) -> _Problem:
+        """Of what is left (N, n) at samples ``rows``, no more than so many of them."""
         rows = rows[:: -(-len(rows) // most)]
         weight = evidence.rows[rows] / evidence.scale
         poses = LinkPoses.of(evidence.model.arm, evidence.samples.motion.q[rows])
         reach = float(max(np.linalg.norm(p - poses.origins[0], axis=1).max() for p in poses.p))
-        y = evidence.residual([])[rows] * weight
+        y = left[rows] * weight
         return _Problem(poses, weight, y, evidence.blocks[rows], max(reach, 0.1))
 
     @cached_property
