@@ -3,6 +3,8 @@ are told."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from exact_parts import as_it_was
@@ -58,6 +60,8 @@ def test_a_law_that_is_not_listed_is_told_of_both_joints(waved: Diagnosis) -> No
     errors = waved.errors()
     assert [law.rmse for law in waved.laws] == pytest.approx([errors["after"][1], errors["after"][2]])
     assert waved.standing.left == ()
+    # what the laws account for is left to nobody, adopted or not
+    assert all(joint["explained"] > 0.999 for joint in waved.standing.joints)
 
 
 def test_both_are_said_and_adopted(waved: Diagnosis, model: ReconstructedModel) -> None:
@@ -65,6 +69,8 @@ def test_both_are_said_and_adopted(waved: Diagnosis, model: ReconstructedModel) 
     assert [words.split(" keeps")[0] for words in said[:2]] == ["Joint 2", "Joint 3"]
     assert said[2] == "--adopt puts the laws into the augmented model and its feedforward." and len(said) == 3
     assert headline(waved) == "unlisted effect, joints 2, 3"
+    first, second = waved.laws
+    assert headline(replace(waved, unlisted=second, further=[first])) == "unlisted effect, joints 2, 3"
     rows = effects_table(waved).rows
     assert [row[0] for row in rows] == ["unlisted, joint 2", "unlisted, joint 3"]
     adopted = waved.adopt()
