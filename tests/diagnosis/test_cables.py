@@ -149,6 +149,13 @@ def test_what_is_there_beside_it_is_fitted_without_the_fold_too(model: Reconstru
         tau = whole.samples.tau + 3.0 * (whole.fold == k)[:, None] * np.sign(whole.samples.motion.v)
         spoilt = levels(replace(whole, samples=replace(whole.samples, tau=tau)))
         assert spoilt[1 + k] == first[1 + k] and spoilt[0] > first[0] + 0.5
+    # nor does the cable that all of the run says
+    shape = cable.shape._replace(final=cable.shape.without[0])
+    other = [
+        each[0].parameters["level"].value
+        for each in cables._beside(whole, replace(cable, shape=shape), account)
+    ]
+    assert other[1:] == first[1:] and other[0] != first[0]
 
 
 def test_a_spring_that_pushes_while_it_is_short_is_told_from_a_cable(model: ReconstructedModel) -> None:
@@ -218,6 +225,19 @@ def test_a_cable_that_is_never_slack_is_no_spring_that_pushes(model: Reconstruct
     assert problem._squares(2, x, True) == pytest.approx(problem._squares(2, x, False))
 
 
+@pytest.mark.parametrize(("spring", "pushes"), [(0.9995, False), (0.998, True)])
+def test_a_spring_must_leave_less_than_a_cable_by_more_than_rounding(
+    spring: float, pushes: bool, model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = evidence(model, None)
+    problem = cables._Problem.of(whole, whole.kept, whole.residual([]))
+    monkeypatch.setattr(
+        cables._Problem, "_refined", lambda self, link, x, pushes=False: (spring if pushes else 1.0, x)
+    )
+    left, cable = problem._of_link(1)
+    assert (cable.pushes, left) == (pushes, spring if pushes else 1.0)
+
+
 def test_errors_follow_the_likelihood_however_small_they_begin(model: ReconstructedModel) -> None:
     problem, cable = of_cables(model, pull)
     errors, count = problem.errors(cable)
@@ -230,8 +250,9 @@ def test_what_may_run_to_another_link_is_as_uncertain_as_they_are_apart(model: R
     problem, cable = of_cables(model, pull)
     left = min(each for each, _ in problem.found)
     other = replace(cable, link=2, slack_length=cable.slack_length + 0.2, attached=(9.0, 9.0, 9.0))
-    for times, alike in ((1.01, True), (2.0, False)):
-        problem.found[:] = [(left, cable), (times * left, other)]
+    far = replace(other, slack_length=200.0)
+    for times, another, alike in ((1.01, other, True), (2.0, far, False)):
+        problem.found[:] = [(left, cable), (times * left, another)]
         error = problem.over_links(cable, np.full(8, 1e-3))
         assert (error[8] > 0.4) == alike and (error[1] > 0.08) == alike
         # a point in the frame of another link is another point
