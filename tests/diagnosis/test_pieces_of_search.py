@@ -179,20 +179,25 @@ class TestSearch:
         assert self.found(self.search(monkeypatch, little)) == []
         assert sorted(self.found(self.search(monkeypatch, {**little, "": 401.0}))) == ["a1", "b1"]
 
-    def test_dry_friction_is_what_one_with_memory_may_be_where_the_joint_has_memory_in_the_model(
-        self,
+    @pytest.mark.parametrize(
+        "memory",
+        [
+            (FrictionTerm("sign", 2.0), FrictionTerm("hysteresis", 1.0, 0.002)),
+            (FrictionTerm("smooth_sign", 2.0, 0.001), FrictionTerm("viscous", 1.0)),
+        ],
+    )
+    def test_dry_friction_is_what_one_with_memory_may_be_where_that_of_the_joint_sets_in_gradually(
+        self, memory: tuple[FrictionTerm, ...]
     ) -> None:
-        memory = (FrictionTerm("sign", 2.0), FrictionTerm("hysteresis", 1.0, 0.002))
-        evidence: Any = SimpleNamespace(
-            model=SimpleNamespace(friction=FrictionLaw((memory, memory, memory[:1])))
-        )
-        remembered = partial(searching.remembered, evidence)
+        sharp = (FrictionTerm("sign", 2.0),)
+        evidence: Any = SimpleNamespace(model=SimpleNamespace(friction=FrictionLaw((memory, memory, sharp))))
+        gradual = partial(searching.gradual, evidence)
         best = effect("presliding_hysteresis", 2)
-        assert remembered(effect("coulomb_friction", 2), best)
+        assert gradual(effect("coulomb_friction", 2), best)
         others = (("coulomb_friction", 1), ("viscous_friction", 2), ("stribeck_friction", 2))
-        assert not any(remembered(effect(*law), best) for law in others)
+        assert not any(gradual(effect(*law), best) for law in others)
         plain = effect("coulomb_friction", 3), effect("presliding_hysteresis", 3)
-        assert not remembered(*plain) and not remembered(best, plain[0])
+        assert not gradual(*plain) and not gradual(best, plain[0])
 
     @pytest.mark.parametrize(
         ("share", "joint", "among", "named"),

@@ -152,18 +152,19 @@ def useful(evidence: Evidence, outcome: Outcome) -> Outcome:
     return useful(evidence, without_effect(evidence, outcome, dropped))
 
 
-def remembered(evidence: Evidence, effect: Effect, best: Effect) -> bool:
-    """Whether the best has an effect in it, and memory, in a joint whose friction has memory in the model.
+def gradual(evidence: Evidence, effect: Effect, best: Effect) -> bool:
+    """Whether the best has an effect in it, and memory, in a joint whose dry friction sets in gradually in the model.
 
-    Dry friction that rises there has it, too, which its law lacks.
+    Dry friction that rises there does so, too, which its law lacks: with the path, or with the speed, which looks alike
+    where the joint turns round.
     """
     if not (_nested(effect, best) and best.rubs and best.memory and best.joint is not None):
         return False
-    return evidence.model.friction.remembers(best.joint - 1)
+    return evidence.model.friction.sets_in_gradually(best.joint - 1)
 
 
 def plainest(evidence: Evidence, outcome: Outcome, among: Collection[Found]) -> Outcome:
-    """The outcome with a nested law in the place of one with memory, where the model's friction has that memory already.
+    """The outcome with a nested law in the place of one with memory, where the model's friction sets in gradually already.
 
     The law must remove all but little of what the richer does, which is its alternative then.
 
@@ -174,7 +175,7 @@ def plainest(evidence: Evidence, outcome: Outcome, among: Collection[Found]) -> 
     for k, richer in enumerate(found):
         for effect, share in richer.rivals if richer in among else []:
             enough = share >= (1 - FREEDOM) * richer.share and effect.place not in there
-            if not (enough and remembered(evidence, effect, richer.effect)):
+            if not (enough and gradual(evidence, effect, richer.effect)):
                 continue
             trial = known_with(evidence, others_than(found, k)).trial(effect)
             if trial is not None:

@@ -21,7 +21,7 @@ from armloop.diagnosis.judgement import (
 )
 from armloop.diagnosis.lasting import much_lasts
 from armloop.diagnosis.masking import masked, stand_in
-from armloop.diagnosis.outcomes import Found, Outcome, clear, known_with, others_than, pruned, remembered
+from armloop.diagnosis.outcomes import Found, Outcome, clear, gradual, known_with, others_than, pruned
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Hypotheses, Known, Tried
 from armloop.laws.effects import Effect, hypotheses
@@ -221,8 +221,7 @@ class _Search:
             and (
                 log_posterior(self.evidence, trial.score, [trial.effect]) >= least
                 or (
-                    remembered(self.evidence, trial.effect, effect)
-                    and gain(current, trial.score) >= MOST * most
+                    gradual(self.evidence, trial.effect, effect) and gain(current, trial.score) >= MOST * most
                 )
             )
         ]

@@ -320,6 +320,10 @@ class FrictionLaw:
         """Whether the friction of a joint (0-based) has memory."""
         return any(term.element.way == "memory" for term in self.terms[joint])
 
+    def sets_in_gradually(self, joint: int) -> bool:
+        """Whether the dry friction of a joint (0-based) is there with the path since it turned round, or with its speed."""
+        return self.remembers(joint) or self.fading(joint) > 0
+
     def fading(self, joint: int) -> float:
         """Least speed over which a direction of the dry friction of a joint (0-based) fades in; 0 where it turns at once."""
         dry = [
