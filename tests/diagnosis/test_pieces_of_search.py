@@ -22,13 +22,24 @@ ANY_ARM: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
 
 
 class Named(str):
-    """An effect that is no more than its name, which ends in the number of its parameters; of joint 1 are w to z."""
+    """An effect that is no more than its name, which ends in the number of its parameters.
+
+    Of joint 1 are w to z, of joint 2 u, of both p.
+    """
 
     other_joint = None
 
     @property
+    def pair_wise(self) -> bool:
+        return self[0] == "p"
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        return (0, 1) if self.pair_wise else () if self.joint is None else (self.joint - 1,)
+
+    @property
     def joint(self) -> int | None:
-        return 1 if self[0] in "wxyz" else None
+        return 1 if self[0] in "pwxyz" else 2 if self[0] == "u" else None
 
     @property
     def place(self) -> tuple[str, None, None]:
@@ -112,6 +123,17 @@ class TestSearch:
         # of two that are of no joint no other two are asked for
         elsewhere = {key.replace("x1", "a1").replace("y1", "b1"): value for key, value in left.items()}
         assert self.found(self.search(monkeypatch, elsewhere)) == ["a1", "b1"]
+
+    @pytest.mark.parametrize("pair", ["u1 z1", "a1 u1", "a1 b1"])
+    def test_one_between_two_joints_is_exchanged_for_one_of_either(
+        self, pair: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """It takes a part of both; of the two the first must be of one of its joints."""
+        first, second = pair.split()
+        left = {"": 900.0, "p2": 300.0, first: 600.0, second: 700.0, pair: 20.0}
+        assert sorted(self.found(self.search(monkeypatch, left))) == (
+            ["p2"] if pair == "a1 b1" else pair.split()
+        )
 
     def test_a_posterior_is_the_likelihood_and_the_odds(self, monkeypatch: pytest.MonkeyPatch) -> None:
         search = self.search(monkeypatch, {"": 900.0, "a1": 300.0, "b2": 300.0})

@@ -234,8 +234,11 @@ class TestReasons:
         assert self.standing(monkeypatch, [0.0, 2.0, np.nan]) == (["2 4"], True)
         # the second joint's can be predicted, the first one's is noise, and of the third nobody knows
         assert self.standing(monkeypatch, [0.0, None, 1.5]) == (["3 3"], True)
-        assert self.standing(monkeypatch, [0.0, None, 1.5], left=True) == ()
+        # so much that nobody knows is left, too; of less than twice the baseline, and of noise, nothing is
+        assert self.standing(monkeypatch, [0.0, None, 1.5], left=True) == (2,)
         assert self.standing(monkeypatch, [2.0, 2.0, 0.5], left=True) == (1,)
+        assert self.standing(monkeypatch, [2.0, None, 0.99], left=True) == ()
+        assert self.standing(monkeypatch, [0.0, None, 1.5], left=True, explained=[3]) == ()
         # what is left counts from the baseline on, though less than twice that is not told of
         assert self.standing(monkeypatch, [0.9, 0.51, 0.9], left=True) == (1,)
         assert self.standing(monkeypatch, [0.9, 0.51, 0.9]) == ([], False)

@@ -106,7 +106,11 @@ def law_left(evidence: Evidence, after: Fit, j: int) -> Law:
 
 
 class LawSelection:
-    """Stability selection of what a fit leaves of a joint (0-based): the functions that every fold chooses."""
+    """Stability selection of what a fit leaves of a joint (0-based): the functions that every fold chooses.
+
+    On a part of a motion other functions may be as good as those of the law. Where the folds share none, those of a fold
+    are, of which least is left of every fold with coefficients of the others.
+    """
 
     def __init__(self, evidence: Evidence, after: Fit, j: int) -> None:
         self.evidence, self.joint, mine = evidence, j, after.stacked.joint == j
@@ -145,9 +149,11 @@ class LawSelection:
         whole, error = total(parts), np.array(y)
         for fold, part, support in zip(self._folds, parts, supports, strict=True):
             error[fold] -= X[np.ix_(fold, support)] @ (whole - part).solve(support)
-        stable = reduce(np.intersect1d, supports)
-        if len(stable) == c or (error**2).sum() > (1 - MOSTLY) * (y**2).sum():
+        if (error**2).sum() > (1 - MOSTLY) * (y**2).sum():
             return Law([], y, block)
+        stable = reduce(np.intersect1d, supports)
+        if len(stable) == c:
+            stable = min(supports, key=lambda support: _crossed(parts, support))
         beta = whole.solve(stable)
         spread = covariance(X[:, stable], y - X[:, stable] @ beta, self.rows)
         errors = np.sqrt(np.diag(spread))
@@ -161,6 +167,12 @@ class LawSelection:
             return Law([], y, block)
         terms = [(float(b), names[t - c]) for b, t in zip(beta[c:], stable[c:], strict=True)]
         return Law(terms, error, block, errors[c:])
+
+
+def _crossed(parts: Sequence[Moments], support: Index) -> float:
+    """Sum of squares that functions leave of each fold with coefficients of the others."""
+    whole = total(parts)
+    return float(sum(part.squared_error((whole - part).solve(support), support) for part in parts))
 
 
 def _with_columns(moments: Moments, X: Array, given: Array, y: Array) -> Moments:

@@ -45,7 +45,8 @@ class Standing:
         reasons: sentences.
         joints: entries of ``joints`` in ``diagnosis.json``.
         unknown: whether neither "nothing is there" nor "something is" can be said.
-        left: joints (0-based) of which more than the baseline, and predictable, is left that nothing accounts for.
+        left: joints (0-based) of which more than the baseline is left that nothing accounts for, and can be predicted, or is
+            a multiple of which nobody knows whether it can.
     """
 
     reasons: list[str]
@@ -99,8 +100,9 @@ def standing(
             multiples.append(real)
             reasons.append(words)
         if j + 1 not in explained:
-            unexplained += [j] if real else []
-            unknown |= ratio >= MULTIPLE and real is not False
+            much = ratio >= MULTIPLE and real is not False
+            unexplained += [j] if real or much else []
+            unknown |= much
     # noise, or what happened once, such as a hard stop that all joints feel, makes no other record
     if len(multiples) > max(MOSTLY * judged, 1) and any(real is not False for real in multiples):
         reasons.insert(0, _all_over(model, len(multiples), judged))

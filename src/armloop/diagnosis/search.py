@@ -167,23 +167,34 @@ class _Search:
             yield from self._additions(first)
 
     def _exchanges(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
-        """Sets with two others in the place of two of a joint.
+        """Sets with two others in the place of two of a joint, or of one between two joints.
 
         One effect may lie between two that are there, as a gain does between inertia and friction, and be found with what
-        mends it: no single step leads from there to the two.
+        mends it; one between two joints may take a part of what either has of its own: no single step leads from there to
+        the two.
         """
+        for k, one in enumerate(found):
+            if one.effect.pair_wise:
+                yield from self._two_for(others_than(found, k), one.effect.indices, {one.effect.place})
         for pair in combinations(found, 2):
             joint, places = pair[0].effect.joint, {f.effect.place for f in pair}
-            if joint is None or joint != pair[1].effect.joint:
-                continue
-            others = [f for f in found if f not in pair]
-            firsts = [
-                step
-                for step in self._additions(others)
-                if (new := step[1][-1].effect).joint == joint and new.place not in places
-            ]
-            for _, first in sorted(firsts, key=lambda step: -step[0])[:_FIRST]:
-                yield from self._additions(first)
+            if joint is not None and joint == pair[1].effect.joint:
+                yield from self._two_for([f for f in found if f not in pair], (joint - 1,), places)
+
+    def _two_for(
+        self, others: list[Found], joints: Sequence[int], places: Collection[Place]
+    ) -> Iterator[tuple[float, list[Found]]]:
+        """Sets with two effects more, the first of them of one of some joints (0-based) and not at some places."""
+        firsts = [
+            step
+            for step in self._additions(others)
+            if (new := step[1][-1].effect).joint is not None
+            and new.joint - 1 in joints
+            and not (new.pair_wise and len(joints) > 1)
+            and new.place not in places
+        ]
+        for _, first in sorted(firsts, key=lambda step: -step[0])[:_FIRST]:
+            yield from self._additions(first)
 
     def _additions(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """Sets with one effect more, with their log posteriors."""
