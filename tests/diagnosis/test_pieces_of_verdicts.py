@@ -243,7 +243,11 @@ class TestReasons:
         assert self.standing(monkeypatch, [0.9, 0.51, 0.9], left=True) == (1,)
         assert self.standing(monkeypatch, [0.9, 0.51, 0.9]) == ([], False)
         assert self.standing(monkeypatch, [0.9, 0.5, 0.9], left=True) == ()
-        words, unknown = self.standing(monkeypatch, [9.0, 9.0, 9.0], explained=[2, 3])
+        # noise of four times the baseline may be anything; not where the verdict names what is there
+        assert self.standing(monkeypatch, [1.99, None, 0.99]) == (["1 3.98"], False)
+        assert self.standing(monkeypatch, [2.0, None, 0.99]) == (["1 4"], True)
+        assert self.standing(monkeypatch, [2.0, None, 0.99], explained=[1]) == (["1 4"], False)
+        words, unknown = self.standing(monkeypatch, [9.0, 9.0, 9.0], explained=[1, 2, 3])
         assert words[1:] == ["1 18", "2 18", "3 18"] and not unknown
 
     def test_most_joints_far_above_the_baseline_are_another_arm_or_another_record(
@@ -290,9 +294,9 @@ class TestReasons:
     def test_a_model_that_leaves_half_of_a_torque_judges_nothing_there(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        words, unknown = self.standing(monkeypatch, [9.0, None, None], poor=0.5)
+        words, unknown = self.standing(monkeypatch, [1.9, None, None], poor=0.5)
         assert len(words) == 1 and "leaves 50% of the torque on its own training logs" in words[0] and unknown
-        assert self.standing(monkeypatch, [9.0, None, None], poor=0.49) == (["1 18"], False)
+        assert self.standing(monkeypatch, [1.9, None, None], poor=0.49) == (["1 3.8"], False)
         # one that knows what it leaves says that
         own = {"joint": 1, "explained": 0.5, "predictable_left": 0.4, "std_error": 0.1, "noise": 0.1}
         model: Any = SimpleNamespace(baseline={"nrmse": [0.7, 0.7], "joints": [own]})

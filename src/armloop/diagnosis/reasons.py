@@ -102,7 +102,8 @@ def standing(
         if j + 1 not in explained:
             much = ratio >= MULTIPLE and real is not False
             unexplained += [j] if real or much else []
-            unknown |= much
+            # noise that is a multiple of what is said to be much may be anything, and hides what is smaller
+            unknown |= much or ratio >= MULTIPLE**2
     # noise, or what happened once, such as a hard stop that all joints feel, makes no other record
     if len(multiples) > max(MOSTLY * judged, 1) and any(real is not False for real in multiples):
         reasons.insert(0, _all_over(model, len(multiples), judged))
@@ -298,8 +299,8 @@ def _multiple(part: Parts, j: int, ratio: float, found: bool = False) -> tuple[s
         )
     if part.separated and left + error <= much:
         return (
-            f"{size}, but a regression on the motion predicts little of it on blocks left out: noise, what happened once, "
-            "or what this run shows too seldom",
+            f"{size}, but a regression on the motion predicts little of it on blocks left out: noise (of the sensor, or of "
+            "a joint that chatters, as with play in its gears), what happened once, or what this run shows too seldom",
             False,
         )
     return f"{size}; whether it can be predicted from the motion, this run does not tell", None
