@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from itertools import product
 from types import SimpleNamespace
 from typing import Any
 
@@ -257,7 +256,7 @@ def test_it_is_asked_where_much_is_left_a_load_is_named_or_something_came_and_we
 def test_a_load_of_moments_alone_is_none(model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch) -> None:
     given = evidence(model, run(1, TIMES))
     assert find_carried(given) is not None
-    monkeypatch.setattr(carrying, "_SHORTEST", 9.0)
+    monkeypatch.setattr("armloop.diagnosis.two_states._SHORTEST", 9.0)
     assert find_carried(given) is None
 
 
@@ -283,63 +282,12 @@ def test_a_load_in_one_of_two_logs_is_carried_in_that(model: ReconstructedModel)
     assert not columns[:second].any() and columns[second:].any(axis=(1, 2)).all()
 
 
-def test_the_likeliest_sequence_is_that_of_the_largest_total(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Against every sequence there is, in two runs."""
-    monkeypatch.setattr(carrying, "_PRICE", 2.0)
-    rng = np.random.default_rng(8)
-    run = np.array([1] * 5 + [2] * 4)
-    for _ in range(50):
-        gains = 2 * rng.normal(size=9)
-        every = [np.array(states, dtype=bool) for states in product((False, True), repeat=9)]
-        most = max(carrying._worth(gains, states, run) for states in every)
-        found = carrying._likeliest(gains, run)
-        assert carrying._worth(gains, found, run) == pytest.approx(most)
-    # a change between two runs costs nothing
-    np.testing.assert_array_equal(carrying._likeliest(np.array([-0.1] * 5 + [0.1] * 4), run), run == 2)
-
-
-def test_what_is_short_is_none_and_a_change_within_rest_is_where_it_explains_most(
-    model: ReconstructedModel,
-) -> None:
-    own = evidence(model, run(1, []))
-    kept, motion = own.kept, own.samples.motion
-    # no sample counts from 10 to 12 s, as where the arm rests
-    count = (motion.time[kept] < 10) | (motion.time[kept] > 12)
-    rows = own.rows.copy()
-    rows[kept[~count]] = False
-    own = own.only(rows)
-    time = motion.time[own.kept]
-    run_of = np.ones(len(time), dtype=np.intp)
-    loaded = (time > 10) | ((time > 4) & (time < 4.3))
-    better = np.where(motion.time > 11.3, 1.0, -1.0)
-    (interval,), unknown = carrying._intervals(own, loaded, run_of, better)
-    assert interval.start == pytest.approx(11.3, abs=0.05) and interval.end == motion.time[-1]
-    assert unknown[(motion.time > 10) & (motion.time < 12)].all()
-    assert not unknown[(motion.time > 13) | ((motion.time > 5) & (motion.time < 9))].any()
-    (interval,), _ = carrying._intervals(own, time < 10, run_of, -better)
-    assert interval.start == motion.time[0] and interval.end == pytest.approx(11.3, abs=0.05)
-
-
 def test_parameters_are_as_many_and_in_order() -> None:
     kind = type(effect("carried_load", None))
     good = {"picked_up": [1.0, 4.0], "put_down": [2.0, 5.0]}
     assert kind.fault(good) == ""
     for bad in ({"put_down": [2.0]}, {"put_down": [2.0, 4.0]}, {"picked_up": [], "put_down": []}):
         assert "put_down must come after" in kind.fault({**good, **bad})
-
-
-def test_logs_whose_clocks_have_nothing_to_do_with_each_other() -> None:
-    """One counts from 1970, the next from zero: where the residual is large is asked within each."""
-    time = np.concatenate([1.7e9 + 0.1 * np.arange(50.0), 0.1 * np.arange(50.0)])
-    run = np.repeat([1, 2], 50)
-    y = np.zeros((100, 1))
-    y[20:30], y[80:] = 1.0, 1.0
-    _, large, small = carrying._starts(y, time, run)
-    # averaged over half a second to either side
-    assert (large == ~small).all()
-    for first, last, beyond in ((16, 34, 36), (76, 100, 100)):
-        assert large[first:last].all() and not large[first - 6 : first - 2].any()
-        assert not large[beyond : beyond + 6].any()
 
 
 def test_a_start_of_too_few_samples_explains_nothing(
@@ -350,7 +298,7 @@ def test_a_start_of_too_few_samples_explains_nothing(
     def few(y: np.ndarray, *_: Any) -> list[np.ndarray]:
         return [np.arange(len(y)) < 3]
 
-    monkeypatch.setattr(carrying, "_starts", few)
+    monkeypatch.setattr("armloop.diagnosis.two_states._starts", few)
     assert find_carried(judged) is None
 
 

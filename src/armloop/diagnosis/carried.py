@@ -1,11 +1,9 @@
 """Carried loads: a payload that is there in parts of a run only, as a hidden process of two states.
 
-Load and intervals are found in turn (hard expectation maximisation). The load being given, the likeliest sequence of carried
-and not carried follows by dynamic programming (Viterbi 1967), each change at a price; the sequence being given, the load is
-regressed. It is looked for where the effects found leave more than the model's own shortcomings or are a load themselves, or
-something came and went, and taken if what is then left is far less: what comes and goes is no law of the motion, and a
-search for laws would find the nearest. When the load is carried, all samples say; how heavy it is, only those outside the
-fold that is judged.
+Load and intervals are found in turn (:mod:`armloop.diagnosis.two_states`). It is looked for where the effects found leave
+more than the model's own shortcomings or are a load themselves, or something came and went, and taken if what is then left
+is far less: what comes and goes is no law of the motion, and a search for laws would find the nearest. When the load is
+carried, all samples say; how heavy it is, only those outside the fold that is judged.
 """
 
 from __future__ import annotations
@@ -30,19 +28,12 @@ from armloop.diagnosis.load_direction import pulls_down
 from armloop.diagnosis.outcomes import Found
 from armloop.diagnosis.search import ROUNDS
 from armloop.diagnosis.trials import Known
-from armloop.laws.effects.carried_load import CarriedLoad, Interval
+from armloop.diagnosis.two_states import intervals_of, two_states
+from armloop.laws.effects.carried_load import CarriedLoad
 from armloop.laws.effects.payload import Payload
-from armloop.regression.embedded import ITERATIONS, solve
-from armloop.regression.moments import Moments
-from armloop.util.arrays import Array, Index, Mask, stretches
+from armloop.regression.embedded import solve
+from armloop.util.arrays import Mask
 from armloop.util.progress import Progress
-
-#: Price of a change, as log-likelihood: some ten samples of a torque three times the model's shortcomings.
-_PRICE = 40.0
-#: A load that is there, or is not there, for less than this part of a run, or of this many seconds at a time, is none.
-_LEAST, _SHORTEST = 0.05, 0.4
-#: Seconds over which the residual's size is averaged to begin with.
-_WINDOW = 0.5
 
 
 def account_with_load(
@@ -132,102 +123,16 @@ def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
     X = evidence.columns(load, 0.0) * weight[:, :, None]
     y = evidence.residual([])[evidence.kept] * weight
     run = np.searchsorted(motion.starts, evidence.kept, side="right")
-    time = motion.time[evidence.kept]
-    best: Mask | None = None
-    theta, most = np.zeros(X.shape[2]), 0.0
-    for carried in _starts(y, time, run):
-        gains, beta = np.zeros(len(y)), theta
-        for _ in range(ITERATIONS):
-            if carried.sum() < 2 * X.shape[2]:
-                break
-            beta, _, _ = solve(
-                Moments.of(X[carried].reshape(-1, X.shape[2]), y[carried].ravel()),
-                [CarriedLoad()],
-                [X.shape[2]],
-            )
-            gains = 0.5 * (y**2 - (y - X @ beta) ** 2).sum(axis=1)
-            before, carried = carried, _likeliest(gains, run)
-            if (before == carried).all():
-                break
-        if carried.any() and (total := _worth(gains, carried, run)) > most:
-            best, theta, most = carried, beta, total
-    if best is None or not _LEAST < best.mean() < 1 - _LEAST:
+    found = two_states(
+        X, y, motion.time[evidence.kept], run, lambda sums: solve(sums, [CarriedLoad()], [X.shape[2]])[0]
+    )
+    if found is None:
         return None
     left = evidence.residual([])
-    with_load = left - smooth(evidence.samples, load.columns(evidence.context, 0.0) @ theta)
+    with_load = left - smooth(evidence.samples, load.columns(evidence.context, 0.0) @ found.theta)
     better = ((left**2 - with_load**2) / evidence.scale**2).sum(axis=1)
-    intervals, unknown = _intervals(evidence, best, run, better)
+    intervals, unknown = intervals_of(evidence, found.there, run, better)
     if not intervals:
         return None
     edge = max(evidence.samples.period, evidence.samples.reach)
     return CarriedLoad(intervals=intervals, error=edge), np.broadcast_to(unknown[:, None], left.shape)
-
-
-def _starts(y: Array, time: Array, run: Index) -> list[Mask]:
-    """(K,) samples that may carry the load: all, and those where the averaged residual is large, or is not."""
-    size, mean = (y**2).sum(axis=1), np.empty(len(y))
-    for number in np.unique(run):
-        mine = np.flatnonzero(run == number)
-        sums = np.concatenate([[0.0], np.cumsum(size[mine])])
-        first = np.searchsorted(time[mine], time[mine] - _WINDOW)
-        last = np.searchsorted(time[mine], time[mine] + _WINDOW, side="right")
-        mean[mine] = (sums[last] - sums[first]) / (last - first)
-    large = mean > np.median(mean)
-    return [np.ones(len(y), dtype=bool), large, ~large]
-
-
-def _likeliest(gains: Array, run: Index) -> Mask:
-    """(K,) the sequence of the largest total gain, less the price of each change within a run (Viterbi)."""
-    came_from = np.zeros((len(gains), 2), dtype=bool)
-    without_load, with_load = 0.0, 0.0
-    fresh = np.diff(run, prepend=-1) != 0
-    for k, (own, first) in enumerate(zip(gains.tolist(), fresh.tolist(), strict=True)):
-        price = 0.0 if first else _PRICE
-        put_down, picked_up = with_load - price > without_load, without_load - price > with_load
-        came_from[k] = put_down, not picked_up
-        without_load, with_load = (
-            with_load - price if put_down else without_load,
-            (without_load - price if picked_up else with_load) + own,
-        )
-    carried = np.zeros(len(gains), dtype=bool)
-    state = with_load > without_load
-    for k in range(len(gains) - 1, -1, -1):
-        carried[k] = state
-        state = bool(came_from[k, int(state)])
-    return carried
-
-
-def _worth(gains: Array, carried: Mask, run: Index) -> float:
-    """What a sequence explains, less the price of its changes."""
-    changes = (np.diff(carried.astype(np.int8)) != 0) & (np.diff(run) == 0)
-    return float(gains[carried].sum()) - _PRICE * float(changes.sum())
-
-
-def _intervals(evidence: Evidence, carried: Mask, run: Index, better: Array) -> tuple[list[Interval], Mask]:
-    """When the load is carried, and (N,) samples around its coming and going.
-
-    Between two samples that count, where the arm may rest for a while, it changes where that explains most of all samples.
-
-    Args:
-        better: (N,) squared error that the load removes of each sample.
-    """
-    motion, kept, found = evidence.samples.motion, evidence.kept, []
-    unknown = np.zeros(motion.samples, dtype=bool)
-    reach = max(1, round(evidence.samples.reach / evidence.samples.period))
-    for number, rows in enumerate(motion.runs(), 1):
-        mine = np.flatnonzero(run == number)
-        ends = []
-        for edge in stretches(carried[mine]).ravel().tolist():
-            if edge in (0, len(mine)):  # it is carried from the run's start, or to its end
-                ends.append(rows.start if edge == 0 else rows.stop - 1)
-                continue
-            low, high = int(kept[mine[edge - 1]]), int(kept[mine[edge]])
-            # before it is put down, and after it is picked up, the load explains what is left
-            sums = np.cumsum(better[low : high + 1]) * (-1 if carried[mine[edge]] else 1)
-            ends.append(low + int(np.argmax(sums)))
-            unknown[max(rows.start, low - reach) : min(rows.stop, high + reach + 1)] = True
-        for begin, end in zip(ends[::2], ends[1::2], strict=True):
-            start, stop = float(motion.time[begin]), float(motion.time[end])
-            if stop - start >= _SHORTEST:
-                found.append(Interval(start, stop, tuple(motion.q[begin].tolist())))
-    return found, unknown

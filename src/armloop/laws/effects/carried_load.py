@@ -3,26 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.laws.effects.base import Array, Context, Estimate, Value
-from armloop.laws.effects.events import during
+from armloop.laws.effects.events import Interval, during_any
 from armloop.laws.effects.payload import Payload, on_the_last_link
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Mask
-
-
-@dataclass(frozen=True)
-class Interval:
-    """When a load is carried, s; ``posture`` (n,) of the joints at its start says in which log."""
-
-    start: float
-    end: float
-    posture: tuple[float, ...]
 
 
 class CarriedLoad(Payload):
@@ -57,10 +47,10 @@ class CarriedLoad(Payload):
 
     def carried(self, motion: Motion) -> Mask:
         """(N,) samples in which it is carried."""
-        return _during(motion, self.intervals)
+        return during_any(motion, self.intervals)
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
-        carried = _during(context.motion, _intervals(parameters, context.arm.n))
+        carried = during_any(context.motion, _intervals(parameters, context.arm.n))
         return super().torque(context, parameters) * carried[:, None]
 
     @classmethod
@@ -85,14 +75,6 @@ class CarriedLoad(Payload):
         at = ", ".join(f"{x:.3f}" for x in com)
         when = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in zip(first, last, strict=True))
         return f"{on_the_last_link(mass, at)}, carried from {when} s"
-
-
-def _during(motion: Motion, intervals: Sequence[Interval]) -> Mask:
-    """(N,) samples in which the load is carried."""
-    rows = np.zeros(motion.samples, dtype=bool)
-    for own in intervals:
-        rows |= during(motion, {"start": own.start, "end": own.end, "posture": list(own.posture)})
-    return rows
 
 
 def _intervals(parameters: Mapping[str, Value], n: int) -> list[Interval]:

@@ -1,0 +1,131 @@
+"""A hidden process of two states within a run: something is there, or is not, and what it is like while it is.
+
+State and size are found in turn (hard expectation maximisation). The size being given, the likeliest sequence of states
+follows by dynamic programming (Viterbi 1967), each change at a price; the sequence being given, the size is regressed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from armloop.diagnosis.evidence import Evidence
+from armloop.laws.effects.events import Interval
+from armloop.regression.embedded import ITERATIONS
+from armloop.regression.moments import Moments
+from armloop.util.arrays import Array, Index, Mask, stretches
+
+#: Price of a change, as log-likelihood: some ten samples of a torque three times the model's shortcomings.
+_PRICE = 40.0
+#: What is there, or is not there, for less than this part of a run, or of this many seconds at a time, is none.
+_LEAST, _SHORTEST = 0.05, 0.4
+#: Seconds over which the residual's size is averaged to begin with.
+_WINDOW = 0.5
+
+
+class TwoStates(NamedTuple):
+    """Samples (K,) in which something is there, its coefficients (p,), and what that explains less the price of changes."""
+
+    there: Mask
+    theta: Array
+    worth: float
+
+
+def two_states(
+    X: Array, y: Array, time: Array, run: Index, regress: Callable[[Moments], Array]
+) -> TwoStates | None:
+    """The likeliest sequence; None where nothing is explained, or it is there all the time, or hardly at all.
+
+    Args:
+        X: (K, n, p) columns of what may be there, weighted.
+        y: (K, n) residual, weighted.
+        time: (K,) s.
+        run: (K,) number of the run that a sample is of.
+        regress: the coefficients (p,) of normal equations.
+    """
+    best: Mask | None = None
+    theta, most = np.zeros(X.shape[2]), 0.0
+    for there in _starts(y, time, run):
+        gains, beta = np.zeros(len(y)), theta
+        for _ in range(ITERATIONS):
+            if there.sum() < 2 * X.shape[2]:
+                break
+            beta = regress(Moments.of(X[there].reshape(-1, X.shape[2]), y[there].ravel()))
+            gains = 0.5 * (y**2 - (y - X @ beta) ** 2).sum(axis=1)
+            before, there = there, likeliest(gains, run)
+            if (before == there).all():
+                break
+        if there.any() and (total := _worth(gains, there, run)) > most:
+            best, theta, most = there, beta, total
+    if best is None or not _LEAST < best.mean() < 1 - _LEAST:
+        return None
+    return TwoStates(best, theta, most)
+
+
+def _starts(y: Array, time: Array, run: Index) -> list[Mask]:
+    """(K,) samples in which it may be there: all, and those where the averaged residual is large, or is not."""
+    size, mean = (y**2).sum(axis=1), np.empty(len(y))
+    for number in np.unique(run):
+        mine = np.flatnonzero(run == number)
+        sums = np.concatenate([[0.0], np.cumsum(size[mine])])
+        first = np.searchsorted(time[mine], time[mine] - _WINDOW)
+        last = np.searchsorted(time[mine], time[mine] + _WINDOW, side="right")
+        mean[mine] = (sums[last] - sums[first]) / (last - first)
+    large = mean > np.median(mean)
+    return [np.ones(len(y), dtype=bool), large, ~large]
+
+
+def likeliest(gains: Array, run: Index) -> Mask:
+    """(K,) the sequence of the largest total gain, less the price of each change within a run (Viterbi)."""
+    came_from = np.zeros((len(gains), 2), dtype=bool)
+    absent, there = 0.0, 0.0
+    fresh = np.diff(run, prepend=-1) != 0
+    for k, (own, first) in enumerate(zip(gains.tolist(), fresh.tolist(), strict=True)):
+        price = 0.0 if first else _PRICE
+        ceases, begins = there - price > absent, absent - price > there
+        came_from[k] = ceases, not begins
+        absent, there = there - price if ceases else absent, (absent - price if begins else there) + own
+    states = np.zeros(len(gains), dtype=bool)
+    state = there > absent
+    for k in range(len(gains) - 1, -1, -1):
+        states[k] = state
+        state = bool(came_from[k, int(state)])
+    return states
+
+
+def _worth(gains: Array, there: Mask, run: Index) -> float:
+    """What a sequence explains, less the price of its changes."""
+    changes = (np.diff(there.astype(np.int8)) != 0) & (np.diff(run) == 0)
+    return float(gains[there].sum()) - _PRICE * float(changes.sum())
+
+
+def intervals_of(evidence: Evidence, there: Mask, run: Index, better: Array) -> tuple[list[Interval], Mask]:
+    """When it is there, and (N,) samples around its coming and going.
+
+    Between two samples that count, where the arm may rest for a while, it changes where that explains most of all samples.
+
+    Args:
+        better: (N,) squared error that it removes of each sample while it is there.
+    """
+    motion, kept, found = evidence.samples.motion, evidence.kept, []
+    unknown = np.zeros(motion.samples, dtype=bool)
+    reach = max(1, round(evidence.samples.reach / evidence.samples.period))
+    for number, rows in enumerate(motion.runs(), 1):
+        mine = np.flatnonzero(run == number)
+        ends = []
+        for edge in stretches(there[mine]).ravel().tolist():
+            if edge in (0, len(mine)):  # it is there from the run's start, or to its end
+                ends.append(rows.start if edge == 0 else rows.stop - 1)
+                continue
+            low, high = int(kept[mine[edge - 1]]), int(kept[mine[edge]])
+            # before it ceases, and after it begins, it explains what is left
+            sums = np.cumsum(better[low : high + 1]) * (-1 if there[mine[edge]] else 1)
+            ends.append(low + int(np.argmax(sums)))
+            unknown[max(rows.start, low - reach) : min(rows.stop, high + reach + 1)] = True
+        for begin, end in zip(ends[::2], ends[1::2], strict=True):
+            start, stop = float(motion.time[begin]), float(motion.time[end])
+            if stop - start >= _SHORTEST:
+                found.append(Interval(start, stop, tuple(motion.q[begin].tolist())))
+    return found, unknown
