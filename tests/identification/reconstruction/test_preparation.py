@@ -17,6 +17,9 @@ from armloop.identification.reconstruction.bandwidth import Bandwidth
 from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Blocks
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.preparation import Prepared, prepared
+from armloop.laws.effects import Estimate
+from armloop.laws.effects.torque_ripple import TorqueRipple
+from armloop.model.added_effect import AddedEffect
 from armloop.util.progress import silent
 
 module = sys.modules["armloop.identification.reconstruction.reconstruct"]
@@ -35,7 +38,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         asked["filters"].append((lag, choosing))
         return Bandwidth(asked["corners"].get(lag, 6.0)), Blocks(2.0, 0.5, 0.1)
 
-    def lag(runs: Any, arm: Any, how: Any, aside: Any, seconds: float) -> Any:
+    def lag(runs: Any, arm: Any, how: Any, aside: Any, seconds: float, ripples: Any) -> Any:
+        asked["ripples"] = dict(ripples)
         return SimpleNamespace(seconds=asked["lags"].pop(0))
 
     def zeros(kept: Any, *_: Any) -> Any:
@@ -103,6 +107,44 @@ def test_a_library_that_is_named_is_not_asked_whether_the_logs_suit_it(
         monkeypatch.setattr(module, check, lambda *_: None)
     monkeypatch.setattr(module, "_refused", lambda arm, wanted, ready: {wanted[0]: "why"})
     monkeypatch.setattr(module, "_compared", lambda wanted, refused, attempt, ready: (refused, "all"))
+    monkeypatch.setattr(module, "_chosen", lambda tried: None)
+    monkeypatch.setattr(module, "_find_ripple", lambda *_: None)
+    monkeypatch.setattr(module, "_in_step", lambda *_: None)
     monkeypatch.setattr(module, "_finished", lambda refused, *_: refused)
     refused: Any = reconstruct([LOG], three_axis(), library=library)
     assert list(refused.values()) == ([] if library else ["why"])
+
+
+@pytest.mark.parametrize(
+    ("late", "again", "orders", "anew"),
+    [
+        (0.008, 0.003, (100.0,), True),
+        (0.008, 0.0, (100.0,), True),
+        (0.008, 0.0075, (100.0,), False),  # half a millisecond is not felt below 8.5 Hz
+        (0.0, 0.003, (100.0,), False),
+        (0.008, 0.003, (), False),
+    ],
+)
+def test_a_lag_is_looked_for_anew_beside_the_ripples_that_are_found(
+    late: float, again: float, orders: tuple[float, ...], anew: bool, asked: dict[str, Any]
+) -> None:
+    asked["lags"], asked["corners"] = [late, late], dict.fromkeys((late, again), 8.5)
+    ready = made()
+    tried: Any = SimpleNamespace(
+        found=SimpleNamespace(effects=[AddedEffect(TorqueRipple(2), ripple(order)) for order in orders]),
+        conditioning=USUAL,
+    )
+    asked["lags"] = [again, again]
+
+    def preparing(ripples: Any) -> Prepared:
+        return prepared([LOG], [LOG], three_axis(), [USUAL], None, Options(), silent, ripples=ripples)
+
+    other = module._in_step(ready, tried, preparing)
+    assert (other is not None) is anew
+    if other is not None:
+        assert other.late == again and asked["ripples"] == {2: orders}
+
+
+def ripple(order: float) -> dict[str, Estimate]:
+    numbers = {"amplitude": 0.1, "order": order, "phase": 0.0}
+    return {key: Estimate(value, 0.0, "") for key, value in numbers.items()}

@@ -93,7 +93,7 @@ def test_a_late_speed_makes_no_lag_of_the_torque_below_half_the_corner(dead: flo
     assert 4.25 * late[0].velocity_lag < FELT < 8.5 * late[0].velocity_lag
     intervals = [np.zeros((0, 2))] * 2
     for corner in (8.5, 4.25):
-        own = torque_lags._found(late, three_axis(), Conditioning(corner), intervals, 2.0, 8.5)
+        own = torque_lags._found(late, three_axis(), Conditioning(corner), intervals, 2.0, 8.5, {})
         assert own.seconds == pytest.approx(dead, abs=3e-4)
 
 
@@ -117,7 +117,9 @@ def test_of_fast_logs_as_much_motion_is_looked_at_as_of_slow_ones(monkeypatch: p
 def test_both_corners_see_the_same_speed(monkeypatch: pytest.MonkeyPatch) -> None:
     corners: list[tuple[float, ...]] = []
 
-    def own(logs: Any, arm: Any, how: Conditioning, aside: Any, seconds: float, felt_hz: float) -> TorqueLag:
+    def own(
+        logs: Any, arm: Any, how: Conditioning, aside: Any, seconds: float, felt_hz: float, ripples: Any
+    ) -> TorqueLag:
         corners.append((how.cutoff_hz, felt_hz, how.smear))
         return TorqueLag(0.01, 1e-4, np.full(3, 0.01))
 
@@ -225,3 +227,23 @@ def test_noise_that_the_controller_answers_to_is_no_lag_and_hides_none(dead: flo
     late = torque_lag(logs, three_axis(), Conditioning(8.5), [np.zeros((0, 2))] * len(logs), 2.0)
     assert late.seconds == pytest.approx(dead, abs=3 * late.std_error if dead else 0.0)
     assert late.std_error < 0.25 * DEAD
+
+
+def rippling(seed: int, order: float, size: float = 0.5, stiff: float = 30.0) -> MotionLog:
+    """A run whose torque ripples, and whose arm gives way to that by the compliance of its control."""
+    motion = fourier_motion(40.0, 250.0, seed)
+    ripple = size * np.sin(order * motion.q)
+    yields = bilinear([1.0], [1.0, 2 * stiff, stiff**2], fs=250.0)
+    q = motion.q - 5 * lfilter(*yields, ripple, axis=0)
+    v = np.gradient(q, motion.time, axis=0)
+    vdot = np.gradient(v, motion.time, axis=0)
+    tau = rigid_torque(three_axis(), q, v, vdot) + friction(v) + ripple
+    return replace(measured(motion, tau, seed, name=f"run {seed}"), q=q, v=v)
+
+
+def test_ripples_that_the_controller_answers_to_are_no_lag_beside_them() -> None:
+    logs = [rippling(seed, 60.0) for seed in (1, 2, 3)]
+    given = logs, three_axis(), Conditioning(8.5), [np.zeros((0, 2))] * len(logs), 2.0
+    assert torque_lag(*given).seconds < -0.01
+    beside = torque_lag(*given, dict.fromkeys((1, 2, 3), (60.0,)))
+    assert beside.seconds == 0.0 and np.abs(beside.joints).max() < 5e-4

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 from armloop.data.log import MotionLog
@@ -14,7 +15,7 @@ from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Bl
 from armloop.identification.reconstruction.encoder_zeros import EncoderZeros, encoder_zeros
 from armloop.identification.reconstruction.held_out import held_out_intervals
 from armloop.identification.reconstruction.options import Options
-from armloop.identification.reconstruction.torque_lag import TorqueLag, torque_lag
+from armloop.identification.reconstruction.torque_lag import Ripples, TorqueLag, torque_lag
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress
@@ -45,6 +46,11 @@ class Prepared:
     aside: Sequence[Array]
 
     @property
+    def late(self) -> float:
+        """By how much the torque is later than the motion, s; 0 where nothing is clear."""
+        return self.lag.seconds if self.lag else 0.0
+
+    @property
     def runs(self) -> Sequence[LogSource]:
         """The logs, in memory where they are."""
         return self.kept or self.logs
@@ -52,7 +58,7 @@ class Prepared:
     def conditioning(self, usual: Conditioning) -> Conditioning:
         """The filter for a library that would usually have this one."""
         how = self.given or self.bandwidth.suited(usual)
-        return replace(how, torque_lag=self.lag.seconds if self.lag else 0.0)
+        return replace(how, torque_lag=self.late)
 
     def history(self) -> dict[str, Any]:
         """What of it the model's history holds."""
@@ -93,6 +99,7 @@ def prepared(
     progress: Progress,
     *,
     corrected: bool = True,
+    ripples: Ripples = MappingProxyType({}),
 ) -> Prepared:
     """Choose how logs are preprocessed.
 
@@ -102,6 +109,7 @@ def prepared(
         usual: filters of the libraries that are going to be regressed.
         given: the filter, where the user has said which.
         corrected: whether the torque's lag and the encoders' zeros are looked for.
+        ripples: orders of the torque's ripples that are known, by their joints (1-based).
     """
     runs = kept or logs
     late, corners = None, set[float]()
@@ -117,7 +125,7 @@ def prepared(
             break
         corners.add(bandwidth.cutoff_hz)
         progress("whether the torque is in step with the motion")
-        found = torque_lag(runs, arm, filters[0], aside, blocks.seconds)
+        found = torque_lag(runs, arm, filters[0], aside, blocks.seconds, ripples)
         if not found.seconds:
             break
         # what is out of step asks for a low corner, and a lag is known best at a high one

@@ -12,7 +12,7 @@ import numpy as np
 from armloop.data.motion import Samples
 from armloop.data.pieces import IN_MEMORY, LogSource
 from armloop.data.repeats import require_different
-from armloop.data.signals import Conditioning
+from armloop.data.signals import FELT, Conditioning
 from armloop.dynamics.physics import check_physics
 from armloop.identification.goodness import Parts, merged, parts_of, witness
 from armloop.identification.goodness.features import Scales
@@ -44,6 +44,7 @@ from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import Score, residual
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
+from armloop.model.added_effect import ripples
 from armloop.robot.arm import Arm
 from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.errors import InputError
@@ -211,6 +212,14 @@ def reconstruct(
 
     refused = {} if library is not None else _refused(arm, wanted, ready)
     tried, part = _compared(wanted, refused, attempt, ready)
+    if method != REFERENCE:
+        _find_ripple(_chosen(tried), ready.logs)
+        again = _in_step(ready, _chosen(tried), partial(preparing, arm=arm))
+        if again is not None:
+            ready = again
+            progress("the torque's ripples had a part in when it seems to be recorded: anew beside them")
+            tried, part = _compared(wanted, refused, attempt, ready)
+            _find_ripple(_chosen(tried), ready.logs)
     return _finished(tried, part, method, ready, progress, recorded)
 
 
@@ -239,6 +248,22 @@ def _compared(
     return tried, "all" if few else "test"
 
 
+def _chosen(libraries: Sequence[Contender]) -> Attempt:
+    """What the library came to that is taken."""
+    (tried,) = [one.attempt for one in libraries if one.chosen]
+    assert tried is not None
+    return tried
+
+
+def _in_step(ready: Prepared, tried: Attempt, preparing: Callable[..., Prepared]) -> Prepared | None:
+    """The logs with another lag of their torque, beside the ripples found; None where it is felt to be the same."""
+    orders = ripples(tried.found.effects)
+    if not (orders and ready.late):
+        return None
+    again = preparing(ripples=orders)
+    return again if abs(again.late - ready.late) * tried.conditioning.cutoff_hz >= FELT else None
+
+
 def _finished(
     libraries: list[Contender],
     part: Part,
@@ -248,11 +273,8 @@ def _finished(
     recorded: dict[str, Any] | None,
 ) -> Reconstruction:
     """The model with its history, its baseline on held-out data and its standard errors."""
-    (tried,) = [one.attempt for one in libraries if one.chosen]
-    assert tried is not None
+    tried = _chosen(libraries)
     found, data, compared = tried.found, tried.data, len(libraries) > 1
-    if method != REFERENCE:
-        _find_ripple(tried, ready.logs)
     notes = [*(comparison_notes(libraries) if compared else []), *found.notes, *ready.blocks.notes()]
     model = found.model(
         conditioning=tried.conditioning,

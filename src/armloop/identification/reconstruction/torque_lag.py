@@ -11,14 +11,16 @@ the end take no part.
 A stiff controller answers to the noise of a coarse encoder, which then is in the torque as well as in the columns, and least
 squares take what it makes of one for a lag, or hide one. The same columns of a smoother motion, in which that noise is not,
 are instruments: where these contradict least squares (Hausman, Econometrica 46, 1978), they are believed (Janot, Vandanjon
-and Gautier, IEEE Transactions on Control Systems Technology 22, 2014).
+and Gautier, IEEE Transactions on Control Systems Technology 22, 2014). Ripples of the gears are such a noise, too, which the
+controller answers to: once they are known they are regressed with the rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -37,6 +39,7 @@ from armloop.data.signals import (
     later,
     preprocess,
     rate_along,
+    smooth,
 )
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.bandwidth import (
@@ -64,6 +67,9 @@ _LONGEST = 0.1
 _EXACT = 1e-9
 #: Laws whose torque, where a joint turns round, would else be a lag: dry friction that falls with the speed leads.
 _FRICTION = (*FRICTION, *(FrictionTerm("stribeck", parameter=speed) for speed in (0.03, 0.1, 0.3)))
+
+#: Orders of ripples by their joints (1-based).
+Ripples = Mapping[int, Sequence[float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +109,12 @@ class TorqueLag:
 
 
 def torque_lag(
-    logs: Sequence[LogSource], arm: Arm, how: Conditioning, aside: Sequence[Array], block_seconds: float
+    logs: Sequence[LogSource],
+    arm: Arm,
+    how: Conditioning,
+    aside: Sequence[Array],
+    block_seconds: float,
+    ripples: Ripples = MappingProxyType({}),
 ) -> TorqueLag:
     """The lag of the logs' torque.
 
@@ -115,16 +126,17 @@ def torque_lag(
         how: filter.
         aside: per log, (B, 2) intervals that take no part.
         block_seconds: length of pieces whose errors are independent.
+        ripples: orders of the torque's ripples that are known, by their joints (1-based).
     """
     placed = placed_runs(logs, how.oversampling * how.cutoff_hz)
     some, left_out = [run for _, run in placed], [aside[k] for k, _ in placed]
-    found = _found(some, arm, how, left_out, block_seconds, how.cutoff_hz)
+    found = _found(some, arm, how, left_out, block_seconds, how.cutoff_hz, ripples)
     if abs(found.seconds) * how.cutoff_hz < FELT or not found.clear:
         return replace(found, seconds=0.0)
     # what a joint that sticks shows before it moves is a lead below any corner: it is kept out twice as far
     slower = replace(how, cutoff_hz=how.cutoff_hz / _SLOWER, smear=2 * how.smear)
     # where v is late, it is as late below half the corner: the torque's own lag alone may differ
-    slow = _found(some, arm, slower, left_out, block_seconds, how.cutoff_hz)
+    slow = _found(some, arm, slower, left_out, block_seconds, how.cutoff_hz, ripples)
     allowed = max(_SURE * float(np.hypot(found.std_error, slow.std_error)), _ALIKE * abs(found.seconds))
     return found if abs(found.seconds - slow.seconds) <= allowed else replace(found, seconds=0.0)
 
@@ -136,6 +148,7 @@ def _found(
     aside: Sequence[Array],
     block_seconds: float,
     felt_hz: float,
+    ripples: Ripples,
 ) -> TorqueLag:
     """The lag below one corner; a standard error without bound where too little moves."""
     base = BaseParameters.of_arm(arm, rotors=True)
@@ -158,8 +171,8 @@ def _found(
             _Part(
                 samples,
                 rows.T,
-                _columns(design, samples, rows.T),
-                _columns(design, replace(samples, motion=slower), rows.T, rates=True),
+                _columns(design, samples, rows.T, ripples),
+                _columns(design, replace(samples, motion=slower), rows.T, ripples, rates=True),
                 np.broadcast_to(blocks, rows.T.shape)[rows.T],
             )
         )
@@ -170,7 +183,7 @@ def _found(
     return by_instruments if contradicted else plain
 
 
-def _columns(design: Design, samples: Samples, rows: Mask, rates: bool = False) -> Array:
+def _columns(design: Design, samples: Samples, rows: Mask, ripples: Ripples, rates: bool = False) -> Array:
     """(R, p) columns of all coefficients in the rows (n, N) of each joint; with their rates (2, R, p)."""
     n, shared = design.arm.n, design.count
     found: list[list[Array]] = [[] for _ in range(n)]
@@ -183,7 +196,18 @@ def _columns(design: Design, samples: Samples, rows: Mask, rates: bool = False) 
         own[:, :, where] = np.stack(both)[:, inside]
         found[part.joint].append(own)
     X = np.concatenate([piece for pieces in found for piece in pieces], axis=1)
+    X = np.concatenate([X, *(_rippling(samples, rows, *one, rates) for one in ripples.items())], axis=2)
     return X if rates else np.asarray(X[0])
+
+
+def _rippling(samples: Samples, rows: Mask, joint: int, orders: Sequence[float], rates: bool) -> Array:
+    """(1 or 2, R, p) columns of a joint's (1-based) ripples, with their rates, zero in the rows of other joints."""
+    angle = samples.motion.q[:, [joint - 1]] * np.asarray(orders)
+    own = smooth(samples, np.hstack([np.sin(angle), np.cos(angle)]))
+    both = np.stack([own, *([rate_along(samples, own)] if rates else [])])
+    found = np.zeros((len(both), int(rows.sum()), own.shape[1]))
+    found[:, np.nonzero(rows)[0] == joint - 1] = both[:, rows[joint - 1]]
+    return found
 
 
 @dataclass(frozen=True, eq=False)
