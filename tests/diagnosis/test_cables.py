@@ -246,6 +246,23 @@ def test_errors_follow_the_likelihood_however_small_they_begin(model: Reconstruc
     assert (found[2:] > 0.3 * errors[2:]).all() and (found < 5 * errors + 0.01).all()
 
 
+def test_a_profile_moves_on_however_little_is_said_of_its_errors(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By ten doublings at the most: a cable of no stiffness has no errors, and nothing holds it."""
+    problem, cable = of_cables(model, pull)
+    moved: list[np.ndarray] = []
+
+    def refined(self: Any, link: int, x: np.ndarray, pushes: bool, held: int) -> tuple[float, np.ndarray]:
+        moved.append(x)
+        return best, x
+
+    best = problem._squares(cable.link - 1, cables._numbers(cable))
+    monkeypatch.setattr(cables._Problem, "_refined", refined)
+    problem.profiled(cable, np.zeros(8), 100.0)
+    assert 0 < len(moved) <= 12 * 11
+
+
 def test_what_may_run_to_another_link_is_as_uncertain_as_they_are_apart(model: ReconstructedModel) -> None:
     problem, cable = of_cables(model, pull)
     left = min(each for each, _ in problem.found)

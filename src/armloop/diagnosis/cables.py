@@ -41,6 +41,8 @@ _USUAL = np.array([1.0, 1.0, 1.0, 0.3, 0.3, 0.3, 1.0])
 _HELD, _UNLIKELY = 1e-9, 4.0
 #: Stiffness, slack length, anchor and point, of stiffness and the numbers of a cable.
 _ORDER = [0, 7, *range(1, 7)]
+#: The least part of what is usual by which a profile begins to move: what has no error by itself may yet bend.
+_FIRST = 1e-3
 #: Steps of a refinement, at most.
 _STEPS = 40
 #: A spring that leaves no more than this part less than a cable does not push in the run.
@@ -229,7 +231,7 @@ class _Problem:
         at = self._stated(cable)
         usual = _USUAL * self.reach
         for i, way in product(range(6), (1.0, -1.0)):
-            step, y = way * errors[2 + i], x
+            step, y = way * max(errors[2 + i], _FIRST * usual[i]), x
             while abs(y[i] - x[i]) < usual[i]:
                 left, y = self._refined(link, y + step * np.eye(7)[i], cable.pushes, i)
                 deviance = count * (left / best - 1)
