@@ -29,6 +29,7 @@ class Effect:
     other_joint: int | None = None
     complexity: int = 1
     sensor: bool = False
+    rubs: bool = False
 
     @property
     def place(self) -> tuple[Any, ...]:
@@ -231,6 +232,18 @@ class Known:
 
     def trial(self, effect: Any) -> Any:
         return of((*self.fit.effects, effect))
+
+
+def test_memory_that_the_model_has_is_not_lacked_all_along() -> None:
+    friction = FrictionLaw(((FrictionTerm("hysteresis", 1.0, 0.002),), (FrictionTerm("sign", 1.0),)))
+    changed, always = _Gain(0.9, SURE), _Gain(0.9, SURE, always=True)
+    for name, joint, kept in (
+        ("presliding_hysteresis", 1, {1: changed}),
+        ("presliding_hysteresis", 2, {0: always, 1: changed}),
+        ("stribeck_friction", 1, {0: always, 1: changed}),
+        ("joint_spring", 1, {0: always, 1: changed}),
+    ):
+        assert reversals._news(friction, listed(name, joint), {0: always, 1: changed}) == kept
 
 
 def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(

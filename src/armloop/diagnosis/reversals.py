@@ -10,10 +10,10 @@ So they are judged after the search, as a condition of their own. As no fit has 
 at least halves the joint's error there, on blocks that were not fitted, and what it removes is a noticeable torque. The
 drives of an arm are alike: what is plain at one joint needs less at the others. A record that is late shows wherever a
 joint turns, and little elsewhere: it is named if at most joints it is as good as what is of them alone. What the model
-leaves at the reversals of its training logs, too, it has lacked all along; the rest has changed since. Of a joint that
-never turned round in them nothing is said: a program that goes from point to point may rest at each. Nor of one whose
-friction has memory in the model, where the search found more dry friction: laws turn with the direction at once, but
-friction that rises keeps its memory, and what shows where the joint turns is that.
+leaves at the reversals of its training logs, too, it has lacked all along, memory where its friction has none; the rest
+has changed since. Of a joint that never turned round in them nothing is said: a program that goes from point to point may
+rest at each. Nor of one whose friction has memory in the model, where the search found more dry friction: laws turn with
+the direction at once, but friction that rises keeps its memory, and what shows where the joint turns is that.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from armloop.diagnosis.outcomes import Found, Outcome, clear
 from armloop.diagnosis.score import mean_by_joint
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
+from armloop.laws.friction import FrictionLaw
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Index, Mask
 from armloop.util.progress import Progress
@@ -96,7 +97,8 @@ def judge_reversals(
     changed = set(view.suspects(start.fit))
     while changed and len(found) < 2 * samples.motion.joints:
         for effect in _concerned(evidence.model.arm, changed, known.fit):
-            gains.take(effect, view.gains(known.fit, known.trial(effect)))
+            of_joints = view.gains(known.fit, known.trial(effect))
+            gains.take(effect, _news(evidence.model.friction, effect, of_joints))
         best = _of_the_record(view, known, evidence.model.arm, gains) or gains.best()
         if best is None:
             break
@@ -147,6 +149,16 @@ def _remembering(evidence: Evidence, outcome: Outcome) -> Mask:
         if law is not None and any(t.element.dry and t.element.way != "memory" for t in law.terms):
             remembering[law.along.joint] = friction.remembers(law.along.joint)
     return remembering
+
+
+def _news(friction: FrictionLaw, effect: Effect, gains: dict[int, _Gain]) -> dict[int, _Gain]:
+    """What an effect gains but for memory of a joint whose friction has some, where the model always lacked so much.
+
+    What that memory lacks of its shape is no effect of its own.
+    """
+    if not (effect.rubs and effect.memory and friction.remembers(effect.index)):
+        return gains
+    return {j: gain for j, gain in gains.items() if not gain.always}
 
 
 def _concerned(arm: Arm, joints: set[int], current: Fit) -> list[Effect]:
