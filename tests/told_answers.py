@@ -76,6 +76,9 @@ class Answers:
             "judge_reversals": self.reversals,
             "account_with_load": self.loaded,
             "account_with_cable": self.cabled,
+            "account_with_spells": lambda whole, account, logs, progress, jobs: self.note(
+                "spells", (whole.name, account.outcome.name, jobs), self.given.get("spells") and account
+            ),
             "account_with_onsets": lambda account, logs, progress, jobs: self.note("onsets", jobs, account),
             "outweighed": lambda *_: None,
             "drowned": lambda *_: False,

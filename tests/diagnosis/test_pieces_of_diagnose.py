@@ -149,6 +149,7 @@ def test_a_cable_is_asked_for_beside_what_is_stated_without(
     answers = Answers(monkeypatch, carried=carried, cable=True, found=["cable"])
     assert judged(jobs=2).outcome.name == "with the cable"
     assert answers.asked["cable"] == ("whole", asked, 2)
+    assert answers.asked["spells"] == ("whole", "with the cable", 2)
 
 
 def test_logs_of_other_joints_and_motor_currents_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

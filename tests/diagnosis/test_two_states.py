@@ -23,9 +23,9 @@ def test_the_likeliest_sequence_is_that_of_the_largest_total(monkeypatch: pytest
     for _ in range(50):
         gains = 2 * rng.normal(size=9)
         every = [np.array(states, dtype=bool) for states in product((False, True), repeat=9)]
-        most = max(two_states._worth(gains, states, run) for states in every)
+        most = max(two_states.worth(gains, states, run) for states in every)
         found = two_states.likeliest(gains, run)
-        assert two_states._worth(gains, found, run) == pytest.approx(most)
+        assert two_states.worth(gains, found, run) == pytest.approx(most)
     # a change between two runs costs nothing
     np.testing.assert_array_equal(two_states.likeliest(np.array([-0.1] * 5 + [0.1] * 4), run), run == 2)
 

@@ -23,6 +23,7 @@ from armloop.diagnosis.search import LOG_ODDS, TELLING, log_prior, told
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect
 from armloop.laws.effects.onset import Onset, log_of
+from armloop.laws.effects.spells import Spells
 from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: An effect is there, and is not there, for so many blocks at least: both folds have seen either.
@@ -98,8 +99,13 @@ class Judged:
 
 def price(evidence: Evidence, effects: Sequence[Effect]) -> float:
     """Log prior odds of effects against none, and of each instant within the run: any of its blocks is as likely."""
-    instants = sum(effect.onset is not None for effect in effects)
-    return log_prior(evidence, effects) - instants * (LOG_ODDS + float(np.log(evidence.blocks.max() + 1)))
+    instants = sum(len(effect.onset.instants) for effect in effects if effect.onset is not None)
+    return log_prior(evidence, effects) - instants * instant_price(evidence)
+
+
+def instant_price(evidence: Evidence) -> float:
+    """Log prior odds against an instant within a run: any of its blocks is as likely."""
+    return LOG_ODDS + float(np.log(evidence.blocks.max() + 1))
 
 
 class ChangePoints:
@@ -153,7 +159,7 @@ class ChangePoints:
             held_out[rows.fold == k] = without.fit.outside[k][rows.fold == k]
         return Judged(part, cut, known, held_out)
 
-    def near(self, onset: Onset) -> Mask:
+    def near(self, onset: Onset | Spells) -> Mask:
         """(N,) samples in which an effect may or may not be there yet: its instant has an error, and the filter a reach."""
         there = onset.there(self._motion)
         rows = np.zeros(len(there), dtype=bool)
@@ -207,7 +213,7 @@ class ChangePoints:
         gates, order = self._gates(part), self._order(part)
         mine = self._score(gates.residual(self._there(part, cut)))
         fixed = self._fixed(part)
-        for x in self._courses():
+        for x in courses(self._motion, self._kept):
             sequence = order[np.argsort(x[order], kind="stable")]
             cuts = np.unique(np.linspace(1, len(order) - 1, _CUTS).astype(np.intp))
             for until in (False, True):
@@ -221,14 +227,6 @@ class ChangePoints:
     def _score(self, left: Array) -> Score:
         samples, joint = np.nonzero(self._weight)
         return Score.of(0, left[samples, joint], joint, self._blocks[samples], left.shape[1])
-
-    def _courses(self) -> Iterator[Array]:
-        """(K,) positions and speeds of every joint, and what they are like over a while."""
-        motion = self._motion
-        for j in range(motion.joints):
-            for x in (motion.q[:, j], np.abs(motion.v[:, j])):
-                yield x[self._kept]
-                yield _averaged(motion, x)[self._kept]
 
     def _order(self, part: Part) -> Index:
         """(M,) samples, of those kept, of the part's log."""
@@ -306,6 +304,14 @@ def _middle(cuts: Index, likely: Array) -> int:
     after = same[same > best]
     last = int(after[0]) - 1 if len(after) else len(cuts) - 1
     return int(cuts[(best + last) // 2])
+
+
+def courses(motion: Motion, kept: Index) -> Iterator[Array]:
+    """(K,) positions and speeds of every joint at some samples, and what they are like over a while."""
+    for j in range(motion.joints):
+        for x in (motion.q[:, j], np.abs(motion.v[:, j])):
+            yield x[kept]
+            yield _averaged(motion, x)[kept]
 
 
 def _averaged(motion: Motion, x: Array) -> Array:

@@ -46,6 +46,7 @@ from armloop.diagnosis.reasons import (
 )
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.score import mean_by_joint, ratio
+from armloop.diagnosis.spells import account_with_spells
 from armloop.diagnosis.suspected import suspected
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted, without_laws
@@ -304,6 +305,7 @@ def diagnose(
             account = best_account(whole, contacts, progress, panel)
         account = account_with_load(whole, account, progress, jobs) or account
         account = account_with_cable(whole, account, progress, jobs) or account
+        account = account_with_spells(whole, account, logs, progress, jobs) or account
         account = account_with_onsets(account, logs, progress, jobs)
         found = _concluded(whole, account, progress)
     stand = replace(found.standing, reasons=[*found.reasons, *own_zeros])

@@ -25,6 +25,7 @@ from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.base import Place
 from armloop.laws.effects.found import FAR
 from armloop.laws.effects.onset import Onset
+from armloop.laws.effects.spells import Spells
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Index, Mask, stretches
 from armloop.util.interpolation import cubic_nodes
@@ -49,7 +50,7 @@ _KEPT = 1 << 28
 
 
 #: What tells the columns of one effect from those of another.
-_Key = tuple[Place, Onset | None]
+_Key = tuple[Place, Onset | Spells | None]
 
 
 class _Columns(dict[tuple[_Key, float], Array]):

@@ -26,7 +26,6 @@ from armloop.diagnosis.trials import Known
 from armloop.diagnosis.unlisted import law_log_prior
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.found import RANGE
-from armloop.laws.effects.onset import Onset
 from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress
 
@@ -90,7 +89,7 @@ def _with_one_more(
         cut, moved = again[1], abs(points.onset(part, again[1]).time - onset.time)
         if moved <= max(onset.error, whole.samples.period):
             break
-    effect = part.effect.within(replace(onset, log=_name(logs, onset)))
+    effect = part.effect.within(replace(onset, log=log_name(logs, onset.time, onset.posture)))
     rivals = [one for one in tested if one is not best and one.likely >= best.likely + np.log(ALTERNATIVE)]
     alike = [(one.part.effect, _share(one)) for one in rivals]
     more = merged(whole, [Found(effect, part.shape, 0.0, alike), *earlier], other)
@@ -203,11 +202,8 @@ def _share(judged: Judged) -> float:
     return float(np.clip(gained / max(float(bare.excess.sum()), 1e-9), 0.0, 1.0))
 
 
-def _name(logs: Sequence[MotionLog], onset: Onset) -> str:
-    """The name of the log that an instant is of: the one that is nearest to its posture then."""
-    there = [log for log in logs if log.time[0] <= onset.time <= log.time[-1]]
-    away = [
-        float(np.abs(log.q[int(np.argmin(np.abs(log.time - onset.time)))] - onset.posture).max())
-        for log in there
-    ]
+def log_name(logs: Sequence[MotionLog], instant: float, posture: Sequence[float]) -> str:
+    """The name of the log that an instant, s, is of: the one that is nearest to its posture (n,) then."""
+    there = [log for log in logs if log.time[0] <= instant <= log.time[-1]]
+    away = [float(np.abs(log.q[int(np.argmin(np.abs(log.time - instant)))] - posture).max()) for log in there]
     return there[int(np.argmin(away))].name if there else ""

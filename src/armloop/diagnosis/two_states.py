@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
-from armloop.laws.effects.events import Interval
+from armloop.laws.effects.spells import Interval
 from armloop.regression.embedded import ITERATIONS
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array, Index, Mask, stretches
@@ -57,7 +57,7 @@ def two_states(
             before, there = there, likeliest(gains, run)
             if (before == there).all():
                 break
-        if there.any() and (total := _worth(gains, there, run)) > most:
+        if there.any() and (total := worth(gains, there, run)) > most:
             best, theta, most = there, beta, total
     if best is None or not _LEAST < best.mean() < 1 - _LEAST:
         return None
@@ -95,7 +95,7 @@ def likeliest(gains: Array, run: Index) -> Mask:
     return states
 
 
-def _worth(gains: Array, there: Mask, run: Index) -> float:
+def worth(gains: Array, there: Mask, run: Index) -> float:
     """What a sequence explains, less the price of its changes."""
     changes = (np.diff(there.astype(np.int8)) != 0) & (np.diff(run) == 0)
     return float(gains[there].sum()) - _PRICE * float(changes.sum())

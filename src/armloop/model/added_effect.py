@@ -10,6 +10,7 @@ from typing import Any
 from armloop.laws.effects import Context, Effect, Estimate, Value, effect
 from armloop.laws.effects.base import Placed, Pointwise, entry
 from armloop.laws.effects.onset import Onset
+from armloop.laws.effects.spells import Spells
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 
@@ -69,6 +70,8 @@ class AddedEffect:
         for word in ("since", "until"):
             if word in data:
                 kind = kind.within(Onset.from_model(data[word], word == "until"))
+        if Spells.word in data:
+            kind = kind.within(Spells.from_model(data[Spells.word]))
         return AddedEffect(
             kind,
             {

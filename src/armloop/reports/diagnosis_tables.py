@@ -37,7 +37,8 @@ def effects_table(diagnosis: Diagnosis) -> Table:
             rows.append([label, key.replace("_", " "), value, unit(e.unit), share, likely, where])
         onset = found.effect.onset
         if onset is not None:
-            rows.append(["", onset.word, with_error(onset.time, onset.error), "s", "", "", ""])
+            for word, instant in onset.instants:
+                rows.append(["", word, with_error(instant, onset.error), "s", "", "", ""])
     for law in diagnosis.laws:
         label = f"unlisted, joint {law.joint}"
         terms = [(k, e) for k, e in law.parameters.items() if k not in RANGE]

@@ -38,10 +38,20 @@ class OnsetData(Struct):
     log: Name = ""
 
 
+class SpellsData(Struct):
+    """The intervals in which an effect is there, by the clocks of their logs."""
+
+    start: Annotated[list[Instant], Meta(min_length=1, max_length=100_000)]
+    end: Annotated[list[Instant], Meta(min_length=1, max_length=100_000)]
+    std_error: Seconds
+    unit: Literal["s"]
+    log: list[Name] = []
+
+
 class FoundData(Struct):
     """An effect that was found, or the law of a residual that no listed effect explains.
 
-    One that is not there all the while has ``since``, from which instant on it is there, or ``until``.
+    One that is not there all the while has ``since``, from which instant on it is there, or ``until``, or ``during``.
     """
 
     effect: Name
@@ -56,6 +66,7 @@ class FoundData(Struct):
     probability: Annotated[float, Meta(ge=0, le=1)] | UnsetType | None = UNSET
     since: OnsetData | UnsetType = UNSET
     until: OnsetData | UnsetType = UNSET
+    during: SpellsData | UnsetType = UNSET
 
 
 class RemainsData(Struct):

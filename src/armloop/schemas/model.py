@@ -118,8 +118,22 @@ class OnsetOfLogData(Struct):
     elsewhere: bool = False
 
 
+class SpellsOfLogsData(Struct):
+    """The intervals in which an effect is there; ``posture`` at the start of each tells which log."""
+
+    start: Annotated[list[Instant], Meta(min_length=1, max_length=100_000)]
+    end: Annotated[list[Instant], Meta(min_length=1, max_length=100_000)]
+    std_error: Seconds
+    posture: Annotated[list[PerJoint], Meta(min_length=1, max_length=100_000)]
+    unit: Literal["s"] = "s"
+    log: list[Name] = []
+
+
 class EffectData(Struct):
-    """An effect that was added, on a joint, a pair, or none; ``since`` or ``until`` an instant if it is not always there."""
+    """An effect that was added, on a joint, a pair, or none.
+
+    ``since`` or ``until`` an instant, or ``during`` intervals, if it is not always there.
+    """
 
     effect: Name
     joint: JointNumber | None
@@ -127,6 +141,7 @@ class EffectData(Struct):
     other_joint: JointNumber | None = None
     since: OnsetOfLogData | UnsetType = UNSET
     until: OnsetOfLogData | UnsetType = UNSET
+    during: SpellsOfLogsData | UnsetType = UNSET
 
 
 class ConditioningData(Struct, forbid_unknown_fields=True):

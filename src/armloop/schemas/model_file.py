@@ -8,7 +8,14 @@ import numpy as np
 from msgspec import UNSET
 
 from armloop.schemas.checking import Misfit, checked
-from armloop.schemas.model import SCHEMA, ArmData, LagrangianData, ModelData, TermsData
+from armloop.schemas.model import (
+    SCHEMA,
+    ArmData,
+    LagrangianData,
+    ModelData,
+    SpellsOfLogsData,
+    TermsData,
+)
 from armloop.schemas.types import FARTHEST, HEAVIEST
 from armloop.util.errors import ModelError
 
@@ -112,8 +119,11 @@ def _agree(model: ModelData) -> None:
                 "one before, up to the same length"
             )
     for k, effect in enumerate(model.effects):
-        if effect.since is not UNSET and effect.until is not UNSET:
-            raise ModelError(f"effects[{k + 1}]: has since and until; give one of them, or neither")
+        times = [word for word in ("since", "until", "during") if getattr(effect, word) is not UNSET]
+        if len(times) > 1:
+            raise ModelError(f"effects[{k + 1}]: has {' and '.join(times)}; give one of them, or none")
+        if effect.during is not UNSET:
+            _check_spells(effect.during, n, f"effects[{k + 1}].during")
         for word, onset in (("since", effect.since), ("until", effect.until)):
             if onset is not UNSET and len(onset.posture) != n:
                 raise ModelError(
@@ -131,6 +141,18 @@ def _agree(model: ModelData) -> None:
             }
             if len(sizes) > 1:
                 raise ModelError(f"effects[{k + 1}]: {name}: value and std_error are not of one length")
+
+
+def _check_spells(during: SpellsOfLogsData, n: int, place: str) -> None:
+    """Raise ``ModelError`` where intervals of an effect are none, or of another arm."""
+    counts = {len(during.start), len(during.end), len(during.posture), len(during.log or during.start)}
+    if len(counts) > 1 or any(b <= a for a, b in zip(during.start, during.end, strict=False)):
+        raise ModelError(
+            f"{place}: each end must come after its start, as many of them, of postures and of logs"
+        )
+    for posture in during.posture:
+        if len(posture) != n:
+            raise ModelError(f"{place}.posture: {len(posture)} joints, the arm has {n}")
 
 
 def _check_arm(arm: ArmData) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.laws.effects.onset import Onset
+from armloop.laws.effects.spells import Spells
 from armloop.laws.friction import Acting, Direction
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import inverse_dynamics
@@ -191,7 +192,7 @@ class Effect(ABC):
     mesh: ClassVar[float | None] = None
     load: ClassVar[bool] = False
     event: bool = False
-    onset: Onset | None = None
+    onset: Onset | Spells | None = None
     searched: ClassVar[bool] = True
     memory: ClassVar[bool] = False
     of_time: ClassVar[bool] = False
@@ -243,8 +244,8 @@ class Effect(ABC):
         """The joints, counted from 1, that its law with these parameters is of; none if it is of the whole arm."""
         return [index + 1 for index in self.indices]
 
-    def within(self, onset: Onset) -> Self:
-        """The same effect, there since an instant of a run, or until then: that was an event of it."""
+    def within(self, onset: Onset | Spells) -> Self:
+        """The same effect, there since an instant of a run; or until then, or at times: that was an event of it."""
         part = copy(self)
         part.onset, part.event = onset, self.event or onset.until
         return part

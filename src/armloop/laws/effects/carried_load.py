@@ -9,8 +9,8 @@ import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.laws.effects.base import Array, Context, Estimate, Value
-from armloop.laws.effects.events import Interval, during_any
 from armloop.laws.effects.payload import Payload, on_the_last_link
+from armloop.laws.effects.spells import Interval, during_any
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Mask
 

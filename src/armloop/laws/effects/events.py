@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -28,23 +27,6 @@ def during(motion: Motion, parameters: dict[str, Value]) -> Mask:
         if posture is not None and not passes(motion, run, start, np.asarray(posture, dtype=float)):
             continue
         rows[run] = (time >= start) & (time <= end)
-    return rows
-
-
-@dataclass(frozen=True)
-class Interval:
-    """When something is there, s; ``posture`` (n,) of the joints at its start says in which log."""
-
-    start: float
-    end: float
-    posture: tuple[float, ...]
-
-
-def during_any(motion: Motion, intervals: Iterable[Interval]) -> Mask:
-    """(N,) samples within one of some intervals."""
-    rows = np.zeros(motion.samples, dtype=bool)
-    for own in intervals:
-        rows |= during(motion, {"start": own.start, "end": own.end, "posture": list(own.posture)})
     return rows
 
 

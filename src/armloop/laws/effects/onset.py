@@ -63,6 +63,11 @@ class Onset:
         """``since`` or ``until``."""
         return "until" if self.until else "since"
 
+    @property
+    def instants(self) -> list[tuple[str, float]]:
+        """The instant, s, after its word."""
+        return [(self.word, self.time)]
+
     def words(self) -> str:
         """Such as ``since 31.2 ± 0.4 s of run_1``."""
         places = int(np.clip(-np.floor(np.log10(max(self.error, 1e-3))), 1, 3))

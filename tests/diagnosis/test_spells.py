@@ -1,0 +1,182 @@
+"""Friction that comes and goes within a run is one effect with its times; pushes and laws of the motion are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from rubbing_arm import model_with_baseline, motion_of, run, torque
+from synthetic import measured
+
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
+from armloop.data.signals import preprocess
+from armloop.diagnosis import Diagnosis, diagnose, spells
+from armloop.diagnosis.evidence import Evidence
+from armloop.laws.effects import hypotheses
+from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.model import ReconstructedModel, load_model
+from armloop.reports.diagnosis_tables import diagnosis_table
+from armloop.schemas.answers import DiagnosisData
+from armloop.schemas.checking import checked
+
+TIMES, LEVEL = [(5.0, 11.0), (17.0, 24.0)], 0.15
+
+
+def within(motion: Motion) -> np.ndarray:
+    """(N, 1) whether a sample lies within the times."""
+    return np.any([(motion.time >= a) & (motion.time < b) for a, b in TIMES], axis=0)[:, None]
+
+
+def drags(motion: Motion) -> np.ndarray:
+    return np.asarray(within(motion) * np.tanh(motion.v / 1e-4) * [0.0, LEVEL, 0.0])
+
+
+def log_of(seed: int, more: Callable[[Motion], np.ndarray], seconds: float = 30.0) -> MotionLog:
+    """A measured run with torque in addition."""
+    motion = motion_of(seed, seconds)
+    return replace(measured(motion, torque(motion) + more(motion), seed, 0.01), name=f"run_{seed}")
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    return model_with_baseline()
+
+
+@pytest.fixture(scope="module")
+def dragging(model: ReconstructedModel) -> Diagnosis:
+    return diagnose(model, [log_of(1, drags)], jobs=1)
+
+
+def test_friction_that_comes_and_goes_is_told_with_its_times(dragging: Diagnosis) -> None:
+    assert dragging.named == [("coulomb_friction", 2)] and not dragging.contacts
+    answer = dragging.to_dict()
+    checked({**answer, "feedforward_change": {}}, DiagnosisData)
+    (entry,) = answer["effects"]
+    assert entry["when"] == "event" and answer["verdict"] == "effects_found"
+    during, level = entry["during"], entry["parameters"]["level"]
+    # nothing is known of when but while the joint slides
+    np.testing.assert_allclose(np.transpose([during["start"], during["end"]]), TIMES, atol=0.5)
+    assert abs(level["value"] - LEVEL) < 3 * level["std_error"] < 0.05
+    error = dragging.errors()
+    assert max(np.divide(error["after"], error["noise_floor"])) < 1.2
+    words = f"from {during['start'][0]:.1f} to {during['end'][0]:.1f} s and from {during['start'][1]:.1f} to"
+    assert words in " ".join(diagnosis_table(dragging).split())
+
+
+def test_the_augmented_model_has_it_then_and_no_controller_supplies_it(
+    model: ReconstructedModel, dragging: Diagnosis, tmp_path: Any
+) -> None:
+    dragging.model.save(tmp_path / "model.json")
+    kept, motion = load_model(tmp_path / "model.json"), dragging.samples.motion
+    more = np.abs(kept.predict(motion) - model.predict(motion))[:, 1]
+    inside, edge = within(motion)[:, 0], np.zeros(motion.samples, dtype=bool)
+    for instant in np.ravel(TIMES):
+        edge |= np.abs(motion.time - instant) < 0.5
+    assert (more[inside & ~edge & (np.abs(motion.v[:, 1]) > 0.05)] > 0.1).all()
+    assert not more[~inside & ~edge].any()
+    other = preprocess([run(2, 20.0)], model.conditioning).motion
+    np.testing.assert_array_equal(kept.predict(other), model.predict(other))
+    asked = motion.q[40], np.array([0.0, 0.5, 0.0]), motion.vdot[40]
+    np.testing.assert_array_equal(kept.feedforward(*asked), model.feedforward(*asked))
+
+
+def test_of_two_logs_it_is_said_which(model: ReconstructedModel) -> None:
+    logs = [log_of(1, drags), log_of(3, lambda motion: 0 * motion.v)]
+    (entry,) = diagnose(model, logs, jobs=1).to_dict()["effects"]
+    assert entry["effect"] == "coulomb_friction" and entry["during"]["log"] == ["run_1", "run_1"]
+    assert "s of run_1 and from" in entry["words"]
+
+
+def pushes(motion: Motion) -> np.ndarray:
+    """Three of them, whatever the joint does meanwhile."""
+    each = [(6.0, 7.0, 0.5), (13.0, 13.8, -0.6), (22.0, 23.2, 0.5)]
+    size = sum(x * ((motion.time >= a) & (motion.time < b)) for a, b, x in each)
+    return np.asarray(size)[:, None] * np.array([0.0, 1.0, 0.0])
+
+
+def rubs_there(motion: Motion) -> np.ndarray:
+    """Where joint 1 stands to one side, joint 2 rubs more."""
+    return np.asarray((motion.q[:, :1] > 0.2) * np.tanh(motion.v / 1e-4) * [0.0, LEVEL, 0.0])
+
+
+@pytest.mark.parametrize("more", [pushes, rubs_there])
+def test_what_is_none_is_not_taken_for_it(
+    more: Callable[[Motion], np.ndarray], model: ReconstructedModel
+) -> None:
+    found = diagnose(model, [log_of(2, more)], jobs=1).to_dict()["effects"]
+    assert found and not any("during" in entry for entry in found)
+    if more is pushes:
+        assert [(e["effect"], e["joint"]) for e in found] == [("external_torque", 2)] * 3
+
+
+def test_a_push_is_in_one_direction() -> None:
+    gains = np.array([5.0, 4.0, 1.0])
+    assert spells._both_ways(gains, np.array([1.0, 2.0, -1.0]))
+    assert not spells._both_ways(gains * [1, 1, 0.9], np.array([1.0, 2.0, -1.0]))
+    assert not spells._both_ways(gains, np.ones(3))
+
+
+def test_what_a_posture_says_as_well_is_a_law_of_the_motion(model: ReconstructedModel) -> None:
+    own = evidence(model)
+    motion = own.samples.motion
+    there = {"time": within(motion)[:, 0], "posture": motion.q[:, 0] > 0.2}
+    for name, rows in there.items():
+        gains = np.where(rows, 5.0, -5.0)[own.kept]
+        # in time a posture is left and taken again and again, each at its price
+        run_of = np.ones(len(gains), dtype=np.intp)
+        most = spells.worth(gains, spells.likeliest(gains, run_of), run_of)
+        assert spells._of_motion(own, gains, most) == (name == "posture")
+
+
+def test_until_its_memory_is_used_up_a_joint_has_not_slid(model: ReconstructedModel) -> None:
+    own = evidence(model)
+    q, v = own.samples.motion.q[:, 1], own.samples.motion.v[:, 1]
+    (turns,) = np.nonzero(np.diff(np.sign(v)) != 0)
+    width = 0.1
+    memory = FrictionLaw(
+        ((), (FrictionTerm("hysteresis", 1.0, 0.01), FrictionTerm("hysteresis", 1.0, width)), ())
+    )
+    bare, remembering = (
+        spells._slid(replace(own, model=replace(own.model, friction=law)), 1)
+        for law in (FrictionLaw(((), (), ())), memory)
+    )
+    assert not (remembering & ~bare).any()
+    since = np.abs(q - q[turns[np.clip(np.searchsorted(turns, np.arange(len(q))) - 1, 0, None)]])
+    after = np.arange(len(q)) > turns[0]
+    lost = after & bare & ~remembering
+    assert (
+        lost.any()
+        and (since[lost] < 2 * width).all()
+        and (since[after & remembering] > 2 * width).mean() > 0.8
+    )
+
+
+def evidence(model: ReconstructedModel) -> Evidence:
+    return Evidence.of(model, preprocess([run(2, 30.0)], model.conditioning), hypotheses(model.arm))
+
+
+@pytest.mark.parametrize(
+    ("left", "law", "events", "asked"),
+    [
+        (3.9, None, 0, False),
+        (4.1, None, 0, True),
+        (0.0, {"v2": 1.0}, 0, False),
+        (0.0, {}, 0, True),
+        (0.0, None, 1, True),
+    ],
+)
+def test_it_is_asked_where_something_came_and_went_or_much_is_left_without_a_law(
+    left: float, law: dict[str, float] | None, events: int, asked: bool
+) -> None:
+    score = SimpleNamespace(energy=np.array([0.0, 10 * left]), rows=np.array([10, 10]))
+    account: Any = SimpleNamespace(
+        laws=[] if law is None else [SimpleNamespace(parameters=law)],
+        outcome=SimpleNamespace(after=SimpleNamespace(score=score)),
+        contacts=[None] * events,
+    )
+    assert spells._is_asked(account) is asked
