@@ -20,7 +20,7 @@ from typing import Any
 
 from armloop import __version__
 from armloop.commands.options import Options
-from armloop.util.doubts import listening
+from armloop.util.doubts import gathered, listening
 from armloop.util.errors import InputError, one_line
 from armloop.util.outputs import guarding
 from armloop.util.quiet import quiet
@@ -129,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options = given.kind(vars(given))
             with guarding(options.command, _named_files(options), options.force):
                 status = given.run(options)
-        for doubt in doubts:
+        for doubt in gathered(doubts):
             print(f"armloop: warning: {doubt}", file=sys.stderr)
     except InputError as error:
         return _fault(str(error), 2)

@@ -6,7 +6,10 @@ from armloop.commands.arguments import seed
 from armloop.commands.options import Options, flag, option
 from armloop.util.outputs import take_folder
 
-HELP = "the main job: collect, reconstruct, track, measure again, find the undeclared effect, add it, track again"
+HELP = (
+    "the main job on arms that come with armloop: collect, reconstruct, track, measure again, find the undeclared effect, "
+    "add it, track again; on an arm of yours these are commands of their own"
+)
 EXAMPLE = "armloop loop --out out/loop"
 
 

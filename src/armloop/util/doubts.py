@@ -5,13 +5,17 @@ Python users get them as `armloop.util.errors.InputWarning` through the standard
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
 from armloop.util.errors import InputWarning
+
+#: So many files of which the same is said are named each.
+_NAMED = 3
 
 _SAID: ContextVar[list[str] | None] = ContextVar("said", default=None)
 
@@ -46,3 +50,16 @@ def listening() -> Iterator[list[str]]:
             yield collected
         finally:
             _SAID.reset(token)
+
+
+def gathered(lines: Sequence[str]) -> list[str]:
+    """The lines; of many that say the same of several files, but for numbers, the first and how many more there are."""
+    alike: dict[str, list[str]] = {}
+    for line in lines:
+        _, _, rest = line.partition(": ")
+        alike.setdefault(re.sub(r"[0-9.]+", "#", rest) or line, []).append(line)
+    said: list[str] = []
+    for each in alike.values():
+        few = len(each) <= _NAMED
+        said += each if few else [f"{each[0]} (the same, but for its numbers, of {len(each) - 1} more)"]
+    return said

@@ -75,10 +75,12 @@ def _say_other_inertia(model: Array, simulated: Array) -> None:
     """Warn of joints whose inertia (n,) in the model is another than that of the arm on which the gains are tried."""
     other = np.flatnonzero(np.abs(np.log(model / simulated)) > np.log(_OTHER)).tolist()
     if other:
-        said = ", ".join(f"{model[j]:.3g} for {simulated[j]:.3g} at joint {j + 1}" for j in other)
+        said = ", ".join(
+            f"{simulated[j]:.3g} where the model has {model[j]:.3g} at joint {j + 1}" for j in other
+        )
         warn(
-            "the proposed gains are for the model's inertia; margins and errors are of the simulated arm, which has another "
-            f"(kg*m^2, kg): {said}"
+            "the proposed gains are for the model's inertia; margins and errors are of the simulated arm, whose own is "
+            f"another (a URDF states no rotors; kg*m^2, kg): {said}"
         )
 
 
