@@ -134,5 +134,5 @@ def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
     intervals, unknown = intervals_of(evidence, found.there, run, better)
     if not intervals:
         return None
-    edge = max(evidence.samples.period, evidence.samples.reach)
+    edge = max(evidence.samples.period, evidence.samples.reach, *(own.gap / 2 for own in intervals))
     return CarriedLoad(intervals=intervals, error=edge), np.broadcast_to(unknown[:, None], left.shape)

@@ -96,7 +96,7 @@ def _given(whole: Evidence, best: _Candidate, logs: Sequence[MotionLog]) -> Foun
     named = best.intervals
     if len(logs) > 1:
         named = tuple(replace(own, log=log_name(logs, own.start, own.posture)) for own in named)
-    edge = max(whole.samples.period, whole.samples.reach)
+    edge = max(whole.samples.period, whole.samples.reach, *(own.gap / 2 for own in best.intervals))
     return Found(best.effect.within(Spells(named, edge)), Shape.fixed(best.shape), 0.0)
 
 
@@ -141,7 +141,7 @@ def _candidates(evidence: Evidence, j: int) -> Iterator[_Candidate]:
             continue
         there, tau = found.there, X @ found.theta
         gains = 0.5 * (y**2 - (y - tau) ** 2)
-        if (tau * v)[there].sum() <= 0 or not _both_ways(gains[there], v[there]):
+        if not _turns(tau[there], gains[there], v[there]):
             continue
         before, left = (float((x**2).sum()) - len(y) for x in (y, y - tau * there))
         inside = (np.diff(there.astype(np.int8)) != 0) & (np.diff(run) == 0)
@@ -156,10 +156,11 @@ def _candidates(evidence: Evidence, j: int) -> Iterator[_Candidate]:
             yield _Candidate(effect, shapes[0], tuple(intervals), unknown, found.worth)
 
 
-def _both_ways(gains: Array, v: Array) -> bool:
-    """Whether what friction explains, sample by sample, is there in both directions of the joint."""
-    total = float(gains.sum())
-    return all(float(gains[way].sum()) >= _BOTH_WAYS * total for way in (v > 0, v < 0))
+def _turns(tau: Array, gains: Array, v: Array) -> bool:
+    """Whether a torque resists a joint's speed in both directions, and explains something, sample by sample, in either."""
+    least = _BOTH_WAYS * float(gains.sum())
+    ways = (v > 0, v < 0)
+    return all(float(gains[way].sum()) >= least and float((tau * v)[way].sum()) > 0 for way in ways)
 
 
 def _of_motion(evidence: Evidence, gains: Array, most: float) -> bool:

@@ -114,18 +114,20 @@ def intervals_of(evidence: Evidence, there: Mask, run: Index, better: Array) -> 
     reach = max(1, round(evidence.samples.reach / evidence.samples.period))
     for number, rows in enumerate(motion.runs(), 1):
         mine = np.flatnonzero(run == number)
-        ends = []
+        ends, gaps = [], []
         for edge in stretches(there[mine]).ravel().tolist():
             if edge in (0, len(mine)):  # it is there from the run's start, or to its end
                 ends.append(rows.start if edge == 0 else rows.stop - 1)
+                gaps.append(0.0)
                 continue
             low, high = int(kept[mine[edge - 1]]), int(kept[mine[edge]])
             # before it ceases, and after it begins, it explains what is left
             sums = np.cumsum(better[low : high + 1]) * (-1 if there[mine[edge]] else 1)
             ends.append(low + int(np.argmax(sums)))
+            gaps.append(float(motion.time[high] - motion.time[low]))
             unknown[max(rows.start, low - reach) : min(rows.stop, high + reach + 1)] = True
-        for begin, end in zip(ends[::2], ends[1::2], strict=True):
+        for begin, end, gap in zip(ends[::2], ends[1::2], map(max, gaps[::2], gaps[1::2]), strict=True):
             start, stop = float(motion.time[begin]), float(motion.time[end])
             if stop - start >= _SHORTEST:
-                found.append(Interval(start, stop, tuple(motion.q[begin].tolist())))
+                found.append(Interval(start, stop, tuple(motion.q[begin].tolist()), gap=gap))
     return found, unknown

@@ -15,12 +15,16 @@ from armloop.util.arrays import Mask
 
 @dataclass(frozen=True)
 class Interval:
-    """When something is there, s; ``posture`` (n,) of the joints at its start says in which log, of the name ``log``."""
+    """When something is there, s; ``posture`` (n,) of the joints at its start says in which log, of the name ``log``.
+
+    Within ``gap`` s around its ends nothing is known of when it comes, or goes.
+    """
 
     start: float
     end: float
     posture: tuple[float, ...]
     log: str = ""
+    gap: float = 0.0
 
 
 def during_any(motion: Motion, intervals: Iterable[Interval]) -> Mask:
