@@ -16,6 +16,8 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose, spells
+from armloop.diagnosis.account import Account, best_account
+from armloop.diagnosis.contacts import find_contacts
 from armloop.diagnosis.evidence import Evidence
 from armloop.laws.effects import hypotheses
 from armloop.laws.friction import FrictionLaw, FrictionTerm
@@ -23,6 +25,7 @@ from armloop.model import ReconstructedModel, load_model
 from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.schemas.answers import DiagnosisData
 from armloop.schemas.checking import checked
+from armloop.util.progress import silent
 
 TIMES, LEVEL = [(5.0, 11.0), (17.0, 24.0)], 0.15
 
@@ -50,6 +53,19 @@ def model() -> ReconstructedModel:
 @pytest.fixture(scope="module")
 def dragging(model: ReconstructedModel) -> Diagnosis:
     return diagnose(model, [log_of(1, drags)], jobs=1)
+
+
+@pytest.fixture(scope="module")
+def whole(model: ReconstructedModel) -> Evidence:
+    return evidence(model, log_of(1, drags))
+
+
+@pytest.fixture(scope="module")
+def account(whole: Evidence) -> Account:
+    """What is said of the run without: a residual of no law."""
+    found = best_account(whole, find_contacts(whole, whole.residual([])), silent)
+    assert [(law.joint, law.parameters) for law in found.laws] == [(2, {})]
+    return found
 
 
 def test_friction_that_comes_and_goes_is_told_with_its_times(dragging: Diagnosis) -> None:
@@ -166,8 +182,63 @@ def test_until_its_memory_is_used_up_a_joint_has_not_slid(model: ReconstructedMo
     )
 
 
-def evidence(model: ReconstructedModel) -> Evidence:
-    return Evidence.of(model, preprocess([run(2, 30.0)], model.conditioning), hypotheses(model.arm))
+def evidence(model: ReconstructedModel, log: MotionLog | None = None) -> Evidence:
+    samples = preprocess([log or run(2, 30.0)], model.conditioning)
+    return Evidence.of(model, samples, hypotheses(model.arm))
+
+
+def test_it_is_found_of_samples_in_which_the_joint_has_slid(
+    whole: Evidence, account: Account, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    best = spells._best(whole, account, [1])
+    assert best is not None and (best.effect.name, best.shape) == ("coulomb_friction", 0.0)
+    assert spells._best(whole, account, [0, 2]) is None
+    others: list[tuple[str, Any]] = [
+        ("_slid", lambda evidence, j: np.zeros(whole.samples.motion.samples, dtype=bool)),
+        ("_of_motion", lambda *_: True),
+        ("MOSTLY", 1.0),  # it must explain most of what is left
+    ]
+    for name, other in others:
+        with monkeypatch.context() as patch:
+            patch.setattr(spells, name, other)
+            assert spells._best(whole, account, [1]) is None
+
+
+def test_what_begins_or_ends_and_no_more_has_an_instant(model: ReconstructedModel, account: Account) -> None:
+    begins = evidence(
+        model, log_of(1, lambda m: (m.time > 14.0)[:, None] * np.tanh(m.v / 1e-4) * [0.0, LEVEL, 0.0])
+    )
+    assert spells._best(begins, account, [1]) is None
+
+
+@pytest.mark.parametrize("viscous", [(0.3, 0.0), pytest.param((0.2, 0.3), marks=pytest.mark.long)])
+def test_beside_what_is_there_all_the_while(viscous: tuple[float, float], model: ReconstructedModel) -> None:
+    """Of another joint, and of the same."""
+    log = log_of(1, lambda m: drags(m) + m.v * [*viscous, 0.0])
+    told = {(e["effect"], e["joint"]): e for e in diagnose(model, [log], jobs=1).to_dict()["effects"]}
+    true = {("viscous_friction", j): x for j, x in enumerate(viscous, 1) if x} | {
+        ("coulomb_friction", 2): LEVEL
+    }
+    assert set(told) == set(true)
+    for place, size in true.items():
+        (estimate,) = told[place]["parameters"].values()
+        assert abs(estimate["value"] - size) < 3.5 * estimate["std_error"]
+        assert ("during" in told[place]) == (place[0] == "coulomb_friction")
+
+
+@pytest.mark.parametrize(("price", "taken"), [(1.0, True), (0.0, False)])
+def test_every_instant_of_an_event_has_its_price(
+    price: float, taken: bool, whole: Evidence, account: Account, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the accounts are as likely else; nor is one taken at the cost of other joints."""
+    monkeypatch.setattr(spells, "posterior", lambda *_: 0.0)
+    monkeypatch.setattr(spells, "instant_price", lambda evidence: price)
+    events: Any = [None, None]
+    account = replace(account, contacts=events)
+    made = spells.account_with_spells(whole, account, [], silent, 1)
+    assert (made is not None) is taken
+    monkeypatch.setattr(spells, "at_the_cost_of_others", lambda *_: True)
+    assert spells.account_with_spells(whole, account, [], silent, 1) is None
 
 
 @pytest.mark.parametrize(

@@ -28,8 +28,11 @@ from armloop.diagnosis.search import ROUNDS
 from armloop.diagnosis.trials import Known
 from armloop.diagnosis.two_states import intervals_of, likeliest, two_states, worth
 from armloop.laws.effects import Effect, hypotheses
+from armloop.laws.effects.coulomb_friction import CoulombFriction
 from armloop.laws.effects.spells import Interval, Spells
+from armloop.laws.effects.viscous_friction import ViscousFriction
 from armloop.laws.hysteresis import stop_operator
+from armloop.model import AddedEffect
 from armloop.regression.embedded import ridge
 from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress
@@ -40,13 +43,17 @@ _BOTH_WAYS = 0.1
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A law of friction, its nonlinear parameter, when it is there, (N,) samples around, and what that explains."""
+    """A law of friction, its nonlinear parameter, when it is there, (N,) samples around, and what that explains.
+
+    What it explains is log-likelihood, less the price of its instants, of which so many lie within a run.
+    """
 
     effect: Effect
     shape: float
     intervals: tuple[Interval, ...]
     unknown: Mask
     worth: float
+    instants: int
 
 
 def account_with_spells(
@@ -67,7 +74,10 @@ def account_with_spells(
     progress(f"{best.effect.label()} is there at times; searching beside it")
     for _ in range(ROUNDS):
         given, unknown = _given(whole, best, logs), np.broadcast_to(best.unknown[:, None], whole.rows.shape)
-        known = Known.of(known_part(whole, unknown), [given.effect], [given.shape])
+        # beside friction that is there all the while, which the search then finds
+        always = [e for e in _always(whole, best.effect.index) if e.name != best.effect.name]
+        shapes = [given.shape, *(Shape.fixed(0.0) for _ in always)]
+        known = Known.of(known_part(whole, unknown), [given.effect, *always], shapes)
         other = account_beside(whole, known, unknown, progress, jobs)
         # what is there beside it had a part in when it seems to be
         again = _best(whole, other, best.effect.indices) if other.outcome.after.effects else None
@@ -101,15 +111,43 @@ def _given(whole: Evidence, best: _Candidate, logs: Sequence[MotionLog]) -> Foun
 
 
 def _best(whole: Evidence, account: Account, joints: Sequence[int]) -> _Candidate | None:
-    """The friction of one of some joints (0-based) that explains most, beside what the account has of the others."""
-    found: list[_Candidate] = []
+    """The friction of one of some joints (0-based) that explains most of what the effects of an account leave.
+
+    Those of its own joint may have been but the nearest names for it: it is asked in their place, beside friction that is
+    there all the while.
+    """
+    added, found = account.outcome.added(), list[_Candidate]()
+    beside = _known(whole, added)
     for j in joints:
-        others = [added for added in account.outcome.added() if j not in added.effect.indices]
-        evidence = without(known_by(whole, others) if others else whole, [])
-        mine = np.zeros_like(evidence.rows)
-        mine[:, j] = evidence.rows[:, j] & _slid(evidence, j)
-        found += _candidates(evidence.only(mine), j) if mine.any() else []
-    return max(found, key=lambda one: one.worth, default=None)
+        others = [a for a in added if j not in a.effect.indices]
+        own = beside if len(others) == len(added) else _known(whole, others)
+        plain, bare = (_of_joint(evidence, j) for evidence in (beside, own))
+        if bare.rows.any():
+            found += _candidates(bare, j, float((_weighted(plain, j) ** 2).sum()))
+    best = max(found, key=lambda one: one.worth, default=None)
+    # what begins, or ends, and no more is told with that instant
+    return best if best is not None and best.instants > 1 else None
+
+
+def _known(whole: Evidence, added: list[AddedEffect]) -> Evidence:
+    """The run without known events, as a model sees it that has some effects."""
+    return without(known_by(whole, added) if added else whole, [])
+
+
+def _of_joint(evidence: Evidence, j: int) -> Evidence:
+    """The run of a joint (0-based) alone, where it has slid."""
+    mine = np.zeros_like(evidence.rows)
+    mine[:, j] = evidence.rows[:, j] & _slid(evidence, j)
+    return evidence.only(mine)
+
+
+def _weighted(evidence: Evidence, j: int) -> Array:
+    """(K,) residual of a joint (0-based) at the samples kept, in what the model leaves on the worst of its own data."""
+    return np.asarray(evidence.residual([])[evidence.kept, j] / _unit(evidence, j))
+
+
+def _unit(evidence: Evidence, j: int) -> float:
+    return float(evidence.scale[j] * np.sqrt(evidence.variation[j]))
 
 
 def _slid(evidence: Evidence, j: int) -> Mask:
@@ -122,38 +160,50 @@ def _slid(evidence: Evidence, j: int) -> Mask:
     return slid
 
 
-def _candidates(evidence: Evidence, j: int) -> Iterator[_Candidate]:
-    """Laws of the friction of a joint (0-based) that explain most of its residual at times, and are none of its motion."""
+def _candidates(evidence: Evidence, j: int, without_it: float) -> Iterator[_Candidate]:
+    """Laws of the friction of a joint (0-based) that explain most of its residual at times, and are none of its motion.
+
+    Args:
+        without_it: squares that the account leaves of the same samples.
+    """
     kept, motion = evidence.kept, evidence.samples.motion
-    residual = evidence.residual([])
-    weight = 1 / (evidence.scale[j] * np.sqrt(evidence.variation[j]))
-    y, v = residual[kept, j] * weight, motion.v[kept, j]
+    residual, y, v = evidence.residual([]), _weighted(evidence, j), motion.v[evidence.kept, j]
+    beside = [evidence.columns(effect, 0.0)[:, j] for effect in _always(evidence, j)]
+    always = np.concatenate(beside, axis=1)[:, None] / _unit(evidence, j)
     run = np.searchsorted(motion.starts, kept, side="right")
     for effect in hypotheses(evidence.model.arm):
-        if not (effect.rubs and effect.linear and effect.indices == (j,)) or effect.of_time:
+        if not (effect.rubs and effect.linear and effect.indices == (j,)):
             continue
         shapes = evidence.tried(effect)
         if len(shapes) != 1:
             continue
-        X = evidence.columns(effect, shapes[0])[:, j] * weight
-        found = two_states(X[:, None], y[:, None], motion.time[kept], run, lambda sums: ridge(sums.G, sums.b))
+        X = evidence.columns(effect, shapes[0])[:, j] / _unit(evidence, j)
+        found = two_states(
+            X[:, None], y[:, None], motion.time[kept], run, lambda sums: ridge(sums.G, sums.b), always
+        )
         if found is None:
             continue
-        there, tau = found.there, X @ found.theta
-        gains = 0.5 * (y**2 - (y - tau) ** 2)
+        there, tau, rest = found.there, X @ found.theta, found.rest[:, 0]
+        gains = 0.5 * (rest**2 - (rest - tau) ** 2)
         if not _turns(tau[there], gains[there], v[there]):
             continue
-        before, left = (float((x**2).sum()) - len(y) for x in (y, y - tau * there))
-        inside = (np.diff(there.astype(np.int8)) != 0) & (np.diff(run) == 0)
-        if left > (1 - MOSTLY) * before or np.count_nonzero(inside) < 2:
-            continue
-        if _of_motion(evidence, gains, found.worth):
+        left = float(((rest - tau * there) ** 2).sum())
+        much = left - len(y) > (1 - MOSTLY) * (without_it - len(y))
+        if much or _of_motion(evidence, gains, worth(gains, there, run)):
             continue
         columns = smooth(evidence.samples, effect.columns(evidence.context, shapes[0]))
         better = residual[:, j] ** 2 - (residual[:, j] - columns @ found.theta) ** 2
         intervals, unknown = intervals_of(evidence, there, run, better)
         if intervals:
-            yield _Candidate(effect, shapes[0], tuple(intervals), unknown, found.worth)
+            inside = np.count_nonzero((np.diff(there.astype(np.int8)) != 0) & (np.diff(run) == 0))
+            explained = worth(gains, there, run) + (without_it - float((rest**2).sum())) / 2
+            yield _Candidate(effect, shapes[0], tuple(intervals), unknown, explained, int(inside))
+
+
+def _always(evidence: Evidence, j: int) -> list[Effect]:
+    """Friction of a joint (0-based) that may be there all the while: dry, and viscous."""
+    names = (CoulombFriction.name, ViscousFriction.name)
+    return [e for e in hypotheses(evidence.model.arm) if e.indices == (j,) and e.name in names]
 
 
 def _turns(tau: Array, gains: Array, v: Array) -> bool:

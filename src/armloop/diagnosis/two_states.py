@@ -13,7 +13,7 @@ import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.laws.effects.spells import Interval
-from armloop.regression.embedded import ITERATIONS
+from armloop.regression.embedded import ITERATIONS, ridge
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array, Index, Mask, stretches
 
@@ -26,15 +26,24 @@ _WINDOW = 0.5
 
 
 class TwoStates(NamedTuple):
-    """Samples (K,) in which something is there, its coefficients (p,), and what that explains less the price of changes."""
+    """Samples (K,) in which something is there, its coefficients (p,), the residual (K, n) without it, and what it explains.
+
+    That is log-likelihood, less the price of its changes.
+    """
 
     there: Mask
     theta: Array
+    rest: Array
     worth: float
 
 
 def two_states(
-    X: Array, y: Array, time: Array, run: Index, regress: Callable[[Moments], Array]
+    X: Array,
+    y: Array,
+    time: Array,
+    run: Index,
+    regress: Callable[[Moments], Array],
+    beside: Array | None = None,
 ) -> TwoStates | None:
     """The likeliest sequence; None where nothing is explained, or it is there all the time, or hardly at all.
 
@@ -43,25 +52,35 @@ def two_states(
         y: (K, n) residual, weighted.
         time: (K,) s.
         run: (K,) number of the run that a sample is of.
-        regress: the coefficients (p,) of normal equations.
+        regress: the coefficients of normal equations, of X and what is beside it.
+        beside: (K, n, q) columns of what is there all the while; none by default.
     """
-    best: Mask | None = None
-    theta, most = np.zeros(X.shape[2]), 0.0
-    for there in _starts(y, time, run):
-        gains, beta = np.zeros(len(y)), theta
+    p, best = X.shape[2], None
+    B = np.zeros((*y.shape, 0)) if beside is None else beside
+    nothing = y - B @ ridge(*_normal(B, y)) if B.shape[2] else y
+    for there in _starts(nothing, time, run):
+        found = None
         for _ in range(ITERATIONS):
-            if there.sum() < 2 * X.shape[2]:
+            if there.sum() < 2 * p:
                 break
-            beta = regress(Moments.of(X[there].reshape(-1, X.shape[2]), y[there].ravel()))
-            gains = 0.5 * (y**2 - (y - X @ beta) ** 2).sum(axis=1)
+            Z = np.concatenate([X * there[:, None, None], B], axis=2)
+            beta = regress(Moments.of(Z.reshape(-1, Z.shape[2]), y.ravel()))
+            rest = y - B @ beta[p:]
+            gains = 0.5 * (rest**2 - (rest - X @ beta[:p]) ** 2).sum(axis=1)
             before, there = there, likeliest(gains, run)
+            explained = worth(gains, there, run) + 0.5 * float((nothing**2).sum() - (rest**2).sum())
+            found = TwoStates(there, beta[:p], rest, explained)
             if (before == there).all():
                 break
-        if there.any() and (total := worth(gains, there, run)) > most:
-            best, theta, most = there, beta, total
-    if best is None or not _LEAST < best.mean() < 1 - _LEAST:
-        return None
-    return TwoStates(best, theta, most)
+        if found is not None and found.there.any() and found.worth > (best.worth if best else 0.0):
+            best = found
+    return best if best is not None and _LEAST < best.there.mean() < 1 - _LEAST else None
+
+
+def _normal(X: Array, y: Array) -> tuple[Array, Array]:
+    """Normal equations of columns (K, n, q) and y (K, n)."""
+    sums = Moments.of(X.reshape(-1, X.shape[2]), y.ravel())
+    return sums.G, sums.b
 
 
 def _starts(y: Array, time: Array, run: Index) -> list[Mask]:
