@@ -159,6 +159,17 @@ def test_what_a_posture_says_as_well_is_a_law_of_the_motion(model: Reconstructed
         assert spells._of_motion(own, gains, most) == (name == "posture")
 
 
+def test_between_two_samples_that_count_nobody_knows_when_it_comes(whole: Evidence, account: Account) -> None:
+    best = spells._best(whole, account, [1])
+    assert best is not None
+    for gap, error in ((0.6, 0.3), (1e-3, max(whole.samples.period, whole.samples.reach))):
+        one = replace(
+            best, intervals=(replace(best.intervals[0], gap=gap), replace(best.intervals[1], gap=0.0))
+        )
+        onset = spells._given(whole, one, []).effect.onset
+        assert onset is not None and onset.error == pytest.approx(error)
+
+
 def test_until_its_memory_is_used_up_a_joint_has_not_slid(model: ReconstructedModel) -> None:
     own = evidence(model)
     q, v = own.samples.motion.q[:, 1], own.samples.motion.v[:, 1]

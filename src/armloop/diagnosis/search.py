@@ -190,7 +190,6 @@ class _Search:
             for step in self._additions(others)
             if (new := step[1][-1].effect).joint is not None
             and new.joint - 1 in joints
-            and not (new.pair_wise and len(joints) > 1)
             and new.place not in places
         ]
         for _, first in sorted(firsts, key=lambda step: -step[0])[:_FIRST]:

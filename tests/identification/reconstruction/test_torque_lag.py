@@ -232,7 +232,7 @@ def test_noise_that_the_controller_answers_to_is_no_lag_and_hides_none(dead: flo
 def rippling(seed: int, order: float, size: float = 0.5, stiff: float = 30.0) -> MotionLog:
     """A run whose torque ripples, and whose arm gives way to that by the compliance of its control."""
     motion = fourier_motion(40.0, 250.0, seed)
-    ripple = size * np.sin(order * motion.q)
+    ripple = size * np.sin(order * motion.q + 0.8)
     yields = bilinear([1.0], [1.0, 2 * stiff, stiff**2], fs=250.0)
     q = motion.q - 5 * lfilter(*yields, ripple, axis=0)
     v = np.gradient(q, motion.time, axis=0)
