@@ -96,6 +96,7 @@ class Answers:
             "without_laws": lambda evidence, laws: evidence,
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
+        parts["of_the_temperature"] = lambda model, added: self.given.get("of_the_temperature", [])
         parts["of_too_few_logs"] = lambda model, found: self.given.get("of_too_few_logs", [])
         parts["suspected"] = lambda evidence, found, left: self.note(
             "suspected", (evidence.name, found, left), self.given.get("suspected", [])

@@ -16,6 +16,7 @@ from armloop.diagnosis import probability
 from armloop.diagnosis.account import Account, best_account, laws_instead
 from armloop.diagnosis.cables import account_with_cable
 from armloop.diagnosis.carried import account_with_load
+from armloop.diagnosis.common_cause import of_the_temperature
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
 from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
@@ -423,6 +424,6 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             too_little(each.effect.label(), each.joints, each.share, each.small, each.errors)
             for each in suspected(evidence, outcome.found, unsaid)
         ]
-    doubted += of_too_few_logs(model, outcome.found)
+    doubted += [*of_the_temperature(model, outcome.added()), *of_too_few_logs(model, outcome.found)]
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))
