@@ -10,7 +10,7 @@ import numpy as np
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
-from armloop.diagnosis.event_size import event_size, event_size_error
+from armloop.diagnosis.event_size import event_size, event_size_elsewhere, event_size_error
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import REFINEMENTS
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, NOTICEABLE, enough, leaves_more
@@ -280,6 +280,7 @@ def _trial(
         return None
     size = event_size(columns, y)
     error = event_size_error(columns, size, y - columns @ size, pieces)
+    error = np.maximum(error, event_size_elsewhere(columns, residual * weight, weight > 0, burst))
     joints = evidence.model.arm.joints
     unit = joints[0].position_unit if len({j.position_unit for j in joints}) == 1 else "rad or m"
     tells = np.asarray(weight[:, columns.any(axis=(0, 2))].any(axis=1))
