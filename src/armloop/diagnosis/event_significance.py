@@ -44,7 +44,9 @@ def told(whole: Evidence, evidence: Evidence, contact: Contact, laws: Sequence[E
 
 
 def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joints: Sequence[int]) -> bool:
-    """Whether an event removes no more than is left, outside of all events, of some stretch of its run that is as long.
+    """Whether an event removes no more than twice what is left, outside of all events, of some stretch that is as long.
+
+    Of a residual that nothing accounts for the highest peaks look like events, and others are hardly lower.
 
     As long in samples that count: where the joint rests nothing is left to see, in a program with dwells of any stretch.
     Each joint counts by its part of what the event removes, as for effects that an unknown rest outweighs.
@@ -70,4 +72,4 @@ def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joi
             sums = np.cumsum(np.append(0.0, left[mine, j][rows[kept, j][mine]]))
             most = float((sums[length:] - sums[:-length]).max(initial=0.0)) / length
             rest[j] = max(rest[j], most - 1.0)
-    return bool(removed @ (removed - rest) < 0)
+    return bool(removed @ (removed - MULTIPLE * rest) < 0)

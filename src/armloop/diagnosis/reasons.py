@@ -205,11 +205,11 @@ def part_of_a_law(labels: Sequence[str], joint: int, share: float, times: float)
 
 
 def event_in_doubt(event: AddedEffect) -> str:
-    """A sentence on an event that removes no more than what nothing accounts for at other times."""
+    """A sentence on an event that removes no more than twice what nothing accounts for at other times."""
     start, end = ends(event.parameters)
     return (
-        f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but as much is left there "
-        "at other times that nothing accounts for: it may be of the same origin, and is not stated"
+        f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but half as much or more is "
+        "left there at other times that nothing accounts for: it may be of the same origin, and is not stated"
     )
 
 
