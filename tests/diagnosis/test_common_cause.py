@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -35,7 +36,7 @@ def more(*viscous: float) -> list[AddedEffect]:
 def test_what_rises_alike_is_one_cause() -> None:
     (words,) = of_the_temperature(model(1.0, 2.0, 0.5), more(0.35, 0.6, 0.2))
     assert "has risen at joints 1, 2, 3 by like parts of the model's (30% to 40%)" in words
-    assert "rather than 3 faults" in words and "grease that is colder" in words
+    assert "likelier than 3 faults" in words and "grease that is colder" in words
     (words,) = of_the_temperature(model(1.0, 2.0, 0.5), more(-0.2, -0.4, -0.2))
     assert "has fallen at joints 1, 2, 3 by like parts of the model's (20% to 40%)" in words
     assert "grease that is warmer" in words
@@ -52,6 +53,13 @@ def test_what_rises_alike_is_one_cause() -> None:
 )
 def test_what_does_not_is_faults(viscous: tuple[float, ...], rises: tuple[float, ...]) -> None:
     assert of_the_temperature(model(*viscous), more(*rises)) == []
+
+
+def test_it_is_asked_of_most_joints() -> None:
+    given = model(1.0, 2.0, 0.5)
+    for joints, told in ((6, True), (7, False)):
+        arm: Any = SimpleNamespace(arm=SimpleNamespace(n=joints), friction=given.friction)
+        assert bool(of_the_temperature(arm, more(0.35, 0.6, 0.2))) is told
 
 
 def test_what_is_there_at_times_is_no_temperature() -> None:

@@ -17,11 +17,11 @@ from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose, spells
 from armloop.diagnosis.account import Account, best_account
-from armloop.diagnosis.contacts import find_contacts
+from armloop.diagnosis.contacts import find_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.laws.effects import hypotheses
+from armloop.laws.effects import Estimate, effect, hypotheses
 from armloop.laws.friction import FrictionLaw, FrictionTerm
-from armloop.model import ReconstructedModel, load_model
+from armloop.model import AddedEffect, ReconstructedModel, load_model
 from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.schemas.answers import DiagnosisData
 from armloop.schemas.checking import checked
@@ -213,6 +213,19 @@ def test_it_is_found_of_samples_in_which_the_joint_has_slid(
         with monkeypatch.context() as patch:
             patch.setattr(spells, name, other)
             assert spells._best(whole, account, [1]) is None
+
+
+def test_it_is_asked_in_the_place_of_what_was_found_at_its_joint(
+    whole: Evidence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    level = {"level": Estimate(0.05, 0.01, "N*m")}
+    first, second = (AddedEffect(effect("coulomb_friction", j), level) for j in (1, 2))
+    known: list[list[AddedEffect]] = []
+    monkeypatch.setattr(spells, "_known", lambda whole, added: known.append(added) or without(whole, []))
+    account: Any = SimpleNamespace(outcome=SimpleNamespace(added=lambda: [first, second]))
+    assert spells._best(whole, account, [1, 2]) is not None
+    # all that was found, and without that of joint 2; of joint 3 nothing was
+    assert known == [[first, second], [first]]
 
 
 def test_what_begins_or_ends_and_no_more_has_an_instant(model: ReconstructedModel, account: Account) -> None:

@@ -135,8 +135,8 @@ def test_why_a_controller_adds_nothing(loop: SimpleNamespace, clean: Diagnosis) 
     ]
     event = AddedEffect(effect("external_contact", None), {})
     assert nothing_to_supply([*found, event]) == (
-        "The controller adds nothing: a sensor's fault is no torque that the arm needs; what pushed the arm, or was "
-        "carried, was an event of this run."
+        "The controller adds nothing: a sensor's fault is no torque that the arm needs; what pushed the arm, was "
+        "carried, or came and went, was an event of this run."
     )
 
 

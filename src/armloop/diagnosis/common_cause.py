@@ -31,6 +31,6 @@ def of_the_temperature(model: ReconstructedModel, added: Sequence[AddedEffect]) 
     joints = ", ".join(map(str, sorted(parts)))
     return [
         f"viscous friction has {way} at joints {joints} by like parts of the model's ({abs(low):.0%} to {abs(high):.0%}): "
-        f"rather than {len(parts)} faults this is one cause that they share, such as grease that is {grease} than in the "
-        "training logs; what is adopted holds at that temperature"
+        f"one cause that they share, such as grease that is {grease} than in the training logs, is likelier than "
+        f"{len(parts)} faults; what is adopted then holds at that temperature"
     ]

@@ -108,8 +108,9 @@ def law_left(evidence: Evidence, after: Fit, j: int) -> Law:
 class LawSelection:
     """Stability selection of what a fit leaves of a joint (0-based): the functions that every fold chooses.
 
-    On a part of a motion other functions may be as good as those of the law. Where the folds share none, those of a fold
-    are, of which least is left of every fold with coefficients of the others.
+    On a part of a motion other functions may be as good as those of the law. Where the folds share none, it is made of those
+    of one fold: that whose functions, with coefficients of the other folds, leave least of every fold. What is left, which
+    judges the law, stays that of each fold's own functions.
     """
 
     def __init__(self, evidence: Evidence, after: Fit, j: int) -> None:

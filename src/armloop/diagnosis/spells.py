@@ -1,9 +1,10 @@
-"""Friction that comes and goes within a run, such as of a brake that drags at times: a hidden process of two states.
+"""Intermittent faults: friction that comes and goes within a run, such as of a brake that drags at times.
 
 A push has a direction of its own; what turns with the joint's is friction. Where several events, or a residual without a
 law, are left of a joint, each law of its friction is asked when it would be there (:mod:`armloop.diagnosis.two_states`). The
 account of the run with it is taken if it is likelier than that of events and laws, each instant at its price, and if no
-posture and no speed says as well when it is there: then it is a law of the motion.
+posture and no speed says as well when it is there: then it is a law of the motion. When it is there all samples say; how
+much it is, only those outside the fold that is judged.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A hidden process of two states within a run: something is there, or is not, and what it is like while it is.
+"""Segmentation by a hidden Markov process of two states: something is there, or is not, and what it is like while it is.
 
 State and size are found in turn (hard expectation maximisation). The size being given, the likeliest sequence of states
 follows by dynamic programming (Viterbi 1967), each change at a price; the sequence being given, the size is regressed.

@@ -143,7 +143,7 @@ def _why_not(added: AddedEffect) -> str:
     if added.effect.sensor:
         return "a sensor's fault is no torque that the arm needs"
     if added.effect.event:
-        return "what pushed the arm, or was carried, was an event of this run"
+        return "what pushed the arm, was carried, or came and went, was an event of this run"
     if added.effect.of_time:
         return "friction that fades is gone once the joint is warm"
     return f"{effect_label(added.effect)} asks for none along this motion"
