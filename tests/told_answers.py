@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armloop.diagnosis.diagnose import Diagnosis, diagnose
+from armloop.diagnosis.diagnose import diagnose
+from armloop.diagnosis.verdict import Diagnosis
 
 module: Any = importlib.import_module("armloop.diagnosis.diagnose")
 ROWS = np.ones((4, 3), dtype=bool)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from armloop.diagnosis.diagnose import why_alike
+from armloop.diagnosis.verdict import why_alike
 from armloop.laws.effects import effect
 
 

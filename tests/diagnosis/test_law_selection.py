@@ -81,6 +81,18 @@ def test_a_law_is_what_every_fold_chooses_with_what_it_leaves_on_the_others() ->
     assert law.left.tolist() == after.held_out[mine].tolist() and len(law.errors) == 0
 
 
+def test_a_cam_that_rubs_on_the_way_up_alone_is_a_law_of_the_joint_and_its_direction() -> None:
+    evidence, after, noise = _moving()
+    motion, mine = evidence.samples.motion, after.stacked.joint == 1
+    q, v = motion.q[::2].T, motion.v[::2].T
+    after.held_out[mine] = 2.0 * np.sin(3 * q[1]) * (v[1] > 0) + 0.1 * noise
+    found = {name: b for b, name in law_left(evidence, after, 1).terms}
+    assert found == pytest.approx({"sin(3*q2)": 1.0, "sin(3*q2)*sign(v2)": 1.0}, abs=0.02)
+    # of other joints' waves, or its own with a speed, far more functions would have to be told apart
+    names = names_of(library_of((True,) * 2), 1)
+    assert not {"sin(3*q1)*sign(v2)", "sin(3*q2)*v2*sign(v2)"} & set(names)
+
+
 def test_of_functions_that_no_two_folds_share_those_that_hold_across_them_are_the_law(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

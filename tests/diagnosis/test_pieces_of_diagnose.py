@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from told_answers import CONTACT, Answers, Evidence, judged, module
 
-from armloop.diagnosis.diagnose import Diagnosis, diagnose
+from armloop.diagnosis.diagnose import diagnose
 from armloop.diagnosis.suspected import Suspected
 from armloop.diagnosis.unlisted import Unlisted
+from armloop.diagnosis.verdict import Diagnosis
 from armloop.laws.effects import effect
 from armloop.model import ReconstructedModel
 from armloop.util.errors import InputError

@@ -181,9 +181,9 @@ class TestLawThatIsNotListed:
     def test_every_function_that_is_sought_can_be_stated(self) -> None:
         names = unlisted.names_of(unlisted.library_of((True, True, False)), 1)
         assert len(set(names)) == len(names) and {"sign(v2)", "v2^3", "v2*sign(v2)"} <= set(names)
-        # with the direction: drag of one wave, dry friction of two
-        assert {"sin(q1)*v1^2*sign(v2)", "sin(q1-q2)*sign(v2)", "cos(2*q2)*sign(v2)"} <= set(names)
-        assert not {"cos(2*q2)*v1*sign(v2)", "cos(3*q2)*sign(v2)"} & set(names)
+        # with the direction: drag of one wave, dry friction of two, of the joint's own angle of all
+        assert {"sin(q1)*v1^2*sign(v2)", "sin(q1-q2)*sign(v2)", "cos(3*q2)*sign(v2)"} <= set(names)
+        assert not {"cos(2*q2)*v1*sign(v2)", "cos(3*q1)*sign(v2)"} & set(names)
         ends = np.zeros(3), np.ones(3)
         stated = unlisted.found_law(
             three_axis(), 2, dict.fromkeys(names, (1.0, 0.1)), *zip(ends, ends, strict=True)

@@ -104,9 +104,9 @@ def test_the_picture_has_eight_small_figures(loop: SimpleNamespace) -> None:
 
 @pytest.mark.usefixtures("_undrawn")
 def test_a_diagnosis_page(loop: SimpleNamespace, clean: Diagnosis) -> None:
-    found = diagnosis_report(loop.diagnosis, loop.reconstruction.model, ["again"])
+    found = diagnosis_report(loop.diagnosis, loop.reconstruction.model)
     assert "Diagnosis: joint spring, joint 2" in found and re.search(r"tau1 = ", found)
-    nothing = diagnosis_report(clean, loop.reconstruction.model, ["clean"])
+    nothing = diagnosis_report(clean, loop.reconstruction.model)
     assert "Diagnosis: no effect" in nothing
     assert not [a for a in Page(found + nothing).addresses if a.startswith("http")]
 
@@ -115,7 +115,7 @@ def test_a_diagnosis_page(loop: SimpleNamespace, clean: Diagnosis) -> None:
 def test_an_unlisted_law_is_shown(loop: SimpleNamespace, clean: Diagnosis) -> None:
     law = Unlisted(2, 3.2, 1.5, "0.48*cos(q2)^2*v2", 1.6)
     text = diagnosis_report(
-        replace(clean, verdict="unlisted_effect", unlisted=law), loop.reconstruction.model, ["odd"]
+        replace(clean, verdict="unlisted_effect", unlisted=law), loop.reconstruction.model
     )
     assert "Diagnosis: unlisted effect, joint 2" in text and "it follows 0.48*cos(q2)^2*v2" in text
 
@@ -123,7 +123,7 @@ def test_an_unlisted_law_is_shown(loop: SimpleNamespace, clean: Diagnosis) -> No
 def test_every_joint_has_its_residual_and_what_the_controller_adds(loop: SimpleNamespace) -> None:
     model = loop.reconstruction.model
     closing = close(model, loop.diagnosis.model, loop.diagnosis.samples)
-    text = diagnosis_report(loop.diagnosis, model, ["again"], closing)
+    text = diagnosis_report(loop.diagnosis, model, closing)
     assert "What is left, on its own scale" in text and "What it changes" in text
     rms = number(float(closing.feedforward.rms[1]))
     assert f">{rms}</td>" in text

@@ -41,11 +41,8 @@ class Diagnosis:
         before: the model that was diagnosed.
     """
 
-    def __init__(
-        self, found: Found, before: ReconstructedModel, logs: Sequence[MotionLog], compensation: Closing
-    ) -> None:
+    def __init__(self, found: Found, before: ReconstructedModel, compensation: Closing) -> None:
         self._found, self._compensation = found, compensation
-        self._names = [log.name for log in logs]
         self.before = Model.of(before)
         self.verdict: str = found.verdict
         self.model = Model.of(found.model)
@@ -60,7 +57,7 @@ class Diagnosis:
         """Write the page of ``armloop diagnose``, without a network; raises ``InputError`` if it cannot be written."""
         from armloop.reports.diagnosis_report import diagnosis_report
 
-        write_text(path, diagnosis_report(self._found, self.before, self._names, self._compensation))
+        write_text(path, diagnosis_report(self._found, self.before, self._compensation))
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:
@@ -100,7 +97,7 @@ def diagnose(
     """Find what a model lacks on a measured run, trace it to a physical effect, and add it; see ``armloop diagnose``.
 
     Args:
-        logs: the run, or several of the same arm.
+        logs: the run, or several of the same arm: judged together, and apart where the arm was not the same in all.
         held_out: further runs of the arm as it is now, never fitted: error before and after on each.
         adopt: put an unlisted law that was found into the model; it acts where the run has been.
         jobs: processes that try the hypotheses; up to four cores by default. The answer does not depend on it.
@@ -122,4 +119,4 @@ def diagnose(
     found = run(plain, runs, progress, jobs)
     found = found.adopt() if adopt else found
     compensation = close(plain, found.model, found.samples, after)
-    return Diagnosis(found, model, runs, compensation)
+    return Diagnosis(found, model, compensation)

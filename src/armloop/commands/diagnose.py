@@ -46,7 +46,7 @@ def run(options: Diagnose) -> None:
     if planned is not None:
         answer["next_run"] = planned.to_dict()
     progress(options)("drawing the report")
-    page = diagnosis_report(result, model, [log.name for log in logs], compensation, options.jobs)
+    page = diagnosis_report(result, model, compensation, options.jobs)
     write_json(folder / "diagnosis.json", answer)
     result.model.save(folder / "model.json")
     write_text(folder / "report.html", page)

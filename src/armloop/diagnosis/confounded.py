@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.fit import Shape, fit
 from armloop.diagnosis.isolability import Part, Stage, left
+from armloop.diagnosis.verdict import Diagnosis
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
 

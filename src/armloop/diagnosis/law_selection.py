@@ -6,6 +6,7 @@ Waves of the angles and their sums, velocities, their products and directions, a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, reduce
@@ -73,19 +74,26 @@ def library_of(revolute: tuple[bool, ...]) -> AngleSums:
     )
 
 
-def _directed(library: AngleSums) -> Index:
-    """Candidates that are sought with the joint's direction, too: those of order 1, and dry friction's level of order 2.
+def _directed(library: AngleSums, j: int) -> Index:
+    """Candidates that are sought with a joint's direction, too: dry friction's level of order 2, its own waves, and order 1.
 
-    A bent shaft or an oval bearing rubs twice a turn; of drag too, many more functions would have to be told apart.
+    A bent shaft or an oval bearing rubs twice a turn, a cam of three lobes thrice, and on the way up alone it may be; of
+    drag, or of other joints' waves, many more functions would have to be told apart.
     """
     at_any_speed = (library.index < library.factors.block("v")[0]).all(axis=1)
-    return np.flatnonzero(library.order() <= 1 + at_any_speed)
+    own = np.array([is_own(name, j) for name in library.names])
+    return np.flatnonzero((library.order() <= 1 + at_any_speed) | (at_any_speed & own))
+
+
+def is_own(name: str, j: int) -> bool:
+    """Whether a function is one of the motion of joint j (0-based) alone."""
+    return set(re.findall(r"[qv](\d+)", name)) <= {str(j + 1)}
 
 
 def names_of(library: AngleSums, j: int) -> list[str]:
     """Names of the functions of a law of a joint (0-based): the library's, those with its direction, its speed cubed."""
     own = f"v{j + 1}"
-    signed = [f"{library.names[k]}*sign({own})".removeprefix("1*") for k in _directed(library)]
+    signed = [f"{library.names[k]}*sign({own})".removeprefix("1*") for k in _directed(library, j)]
     return [*library.names, *signed, f"{own}^3"]
 
 
@@ -120,7 +128,7 @@ class LawSelection:
         self.names = names_of(library, j)
         moving = evidence.samples.motion.take(np.flatnonzero(evidence.rows[:, j]))
         X, own = library.columns(moving), moving.v[:, [j]]
-        X = np.hstack([X, X[:, _directed(library)] * np.sign(own), own**3])
+        X = np.hstack([X, X[:, _directed(library, j)] * np.sign(own), own**3])
         self._folds = [self.rows.fold == k for k in range(FOLDS)]
         self._X = [X[fold] for fold in self._folds]
         self._parts = [Moments.of(X, self.y[fold]) for X, fold in zip(self._X, self._folds, strict=True)]

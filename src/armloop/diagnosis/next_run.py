@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from armloop.diagnosis.confounded import Law, found_laws, lookalikes, pairs
-from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.isolability import Stage
 from armloop.diagnosis.planning import FAR_ENOUGH, Planner, Wish, training_ranges
+from armloop.diagnosis.verdict import Diagnosis
 from armloop.experiment.design import sampled
 from armloop.experiment.design.limits import LIMITED
 from armloop.experiment.excitation import FourierReference

@@ -10,11 +10,11 @@ import numpy as np
 from armloop.data.blocks import BLOCK_SECONDS
 from armloop.data.motion import Motion
 from armloop.diagnosis.confounded import Law, Rivalry
-from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
 from armloop.diagnosis.isolability import Stage, context_of
 from armloop.diagnosis.judgement import NOTICEABLE
 from armloop.diagnosis.search import ROUNDS
+from armloop.diagnosis.verdict import Diagnosis
 from armloop.experiment.design import (
     CRITERIA,
     Columns,

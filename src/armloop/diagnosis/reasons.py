@@ -164,6 +164,21 @@ class _Named(Protocol):
     def always(self) -> bool: ...
 
 
+def unlike(names: Sequence[str], others: Sequence[tuple[Sequence[str], Sequence[str]]]) -> str:
+    """A sentence on logs in which the arm was not the same.
+
+    Args:
+        names: of the logs that all else is said of.
+        others: names of the others, and what was found in them.
+    """
+    there = "; ".join(f"in {', '.join(logs)}: {', '.join(found).replace('_', ' ')}" for logs, found in others)
+    return (
+        "the arm was not the same in all logs, or not at the same times, and they were judged apart: all else here is said of "
+        f"{', '.join(names)} "
+        f"({there})"
+    )
+
+
 def of_too_few_logs(model: ReconstructedModel, found: Sequence[_Named]) -> list[str]:
     """A sentence on friction that is found by a model of too few logs to tell the variance between them."""
     rubbing = [f.effect.label() for f in found if f.effect.rubs and not f.always]

@@ -5,7 +5,6 @@ Listed effects that are part of it are named as what they are; see :mod:`armloop
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -28,7 +27,15 @@ from armloop.diagnosis.judgement import (
     much_is_left,
 )
 from armloop.diagnosis.lasting import FEWEST, lasting
-from armloop.diagnosis.law_selection import Law, LawSelection, is_listed, law_left, library_of, names_of
+from armloop.diagnosis.law_selection import (
+    Law,
+    LawSelection,
+    is_listed,
+    is_own,
+    law_left,
+    library_of,
+    names_of,
+)
 from armloop.diagnosis.outcomes import Found, Outcome, pruned, refitted, with_effects, without_effects_at
 from armloop.diagnosis.reasons import part_of_a_law
 from armloop.diagnosis.score import Score
@@ -293,14 +300,9 @@ def law_log_prior(evidence: Evidence, terms: Collection[str], j: int) -> float:
     """
     arm = evidence.model.arm
     every = names_of(library_of(tuple(arm.revolute.tolist())), j)
-    own = sum(_is_own(name, j) for name in every)
-    odds = [2 * (own if _is_own(name, j) else len(every) - own) for name in terms]
+    own = sum(is_own(name, j) for name in every)
+    odds = [2 * (own if is_own(name, j) else len(every) - own) for name in terms]
     return -float(np.log(len(hypotheses(arm))) + np.log(odds).sum())
-
-
-def _is_own(name: str, j: int) -> bool:
-    """Whether a function is one of the motion of joint j (0-based) alone."""
-    return set(re.findall(r"[qv](\d+)", name)) <= {str(j + 1)}
 
 
 def _stated(evidence: Evidence, outcome: Outcome, law: Law, j: int) -> Unlisted:

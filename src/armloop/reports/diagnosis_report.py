@@ -16,6 +16,7 @@ from armloop.reports.findings import (
     blame,
     findings,
     headline,
+    judged_apart,
     nothing_to_supply,
     reasons,
 )
@@ -90,7 +91,6 @@ def compensation_section(diagnosis: Diagnosis, compensation: Closing) -> Section
 def diagnosis_report(
     diagnosis: Diagnosis,
     model: ReconstructedModel,
-    log_names: Sequence[str],
     compensation: Closing | None = None,
     jobs: int | None = None,
 ) -> str:
@@ -106,9 +106,13 @@ def diagnosis_report(
     )
     folded = [("The model as formulas, one per joint", formulas(model))]
     models = Section("The model", say.paragraphs("model"), formulas=folded)
-    sections = diagnosis_sections(diagnosis, log_names)
+    sections = diagnosis_sections(diagnosis, diagnosis.logs)
     if compensation is not None:
         sections.append(compensation_section(diagnosis, compensation))
+    for other in diagnosis.apart:
+        sections.append(
+            Section(judged_apart(other), findings(other), tables=found_tables(other), notes=reasons(other))
+        )
     return render(
         Report(
             f"Diagnosis: {headline(diagnosis)}",

@@ -9,7 +9,15 @@ import numpy as np
 from armloop.diagnosis import probability
 from armloop.laws.effects.found import RANGE
 from armloop.laws.effects.listed import listed
-from armloop.reports.findings import all_added, blame, confounded, findings, nothing_to_supply, reasons
+from armloop.reports.findings import (
+    all_added,
+    blame,
+    confounded,
+    findings,
+    judged_apart,
+    nothing_to_supply,
+    reasons,
+)
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import MISSING, effect_label, percent, unit, vector, with_error, wrapped
 
@@ -168,4 +176,6 @@ def diagnosis_table(diagnosis: Diagnosis, compensation: Closing | None = None) -
         if not compensation.feedforward.largest.any():
             parts.append(nothing_to_supply(all_added(diagnosis)))
         parts += map(str, compensation_tables(diagnosis, compensation))
+    for other in diagnosis.apart:
+        parts.append("\n".join([judged_apart(other), *map(wrapped, findings(other))]))
     return "\n\n".join(parts)

@@ -57,6 +57,11 @@ def findings(diagnosis: Diagnosis) -> list[str]:
     return Prose("findings", **values).paragraphs("findings") or [_nothing(diagnosis)]
 
 
+def judged_apart(diagnosis: Diagnosis) -> str:
+    """The heading of what is said of logs in which the arm was not the same."""
+    return f"{listed(diagnosis.logs)}, judged apart: {diagnosis.verdict.replace('_', ' ')}"
+
+
 def _events(diagnosis: Diagnosis) -> str:
     """What all events of a run were, in words."""
     forces = all(contact.added.effect.joint is None for contact in diagnosis.contacts)

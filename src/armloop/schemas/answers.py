@@ -100,6 +100,8 @@ class DiagnosisData(Struct):
     reasons: list[Text] = []
     joints: list[JointShareData] = []
     encoder_zeros: list[PerJoint] | UnsetType = UNSET
+    logs: Annotated[list[Name], Meta(description="what this is said of")] = []
+    apart: Annotated[list[DiagnosisData], Meta(description="of logs in which the arm was not the same")] = []
     written_by: Name = ""
 
 

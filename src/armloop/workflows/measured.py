@@ -58,7 +58,7 @@ def run_measured(folder: Path, progress: Progress) -> MeasuredResult:
 
     model.save(folder / "model.json")
     compensation = close(model, diagnosis.model, diagnosis.samples)
-    write_text(folder / "report.html", diagnosis_report(diagnosis, model, [pushed.name], compensation))
+    write_text(folder / "report.html", diagnosis_report(diagnosis, model, compensation))
     answer = {
         "schema": SCHEMA,
         "data": "UR5, Kufieta 2014, Apache-2.0",
