@@ -75,8 +75,8 @@ def leaves_much(found: Diagnosis) -> bool:
 def are_unlike(together: Account, each: Sequence[Account]) -> bool:
     """Whether logs are likelier with an account each than with one together (Bayes factor).
 
-    Each log pays for all that its own account states, and of the common one for the events that are its own alone; and that logs
-    which are given together are of the same arm is likelier beforehand.
+    Each log pays for all that its own account states, and of the common one for the events that are its own alone; and
+    that logs which are given together are of the same arm is likelier beforehand.
     """
     sizes = [own.whole.samples.motion.samples for own in each]
     if sum(sizes) != together.whole.samples.motion.samples:

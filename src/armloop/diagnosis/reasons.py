@@ -173,9 +173,8 @@ def unlike(names: Sequence[str], others: Sequence[tuple[Sequence[str], Sequence[
     """
     there = "; ".join(f"in {', '.join(logs)}: {', '.join(found).replace('_', ' ')}" for logs, found in others)
     return (
-        "the arm was not the same in all logs, or not at the same times, and they were judged apart: all else here is said of "
-        f"{', '.join(names)} "
-        f"({there})"
+        "the arm was not the same in all logs, or not at the same times, and they were judged apart: all else here is said "
+        f"of {', '.join(names)} ({there})"
     )
 
 
