@@ -49,6 +49,12 @@ def freeze(key: str) -> Callable[[Arrays], None]:
     return change
 
 
+def stick(log: Arrays) -> None:
+    """An encoder that is stuck for a second, with a v that is formed of it."""
+    fast = int(np.argmax(np.abs(log["v"][100:-150, 1]))) + 100
+    log["q"][fast - 50 : fast + 50, 1], log["v"][fast - 49 : fast + 50, 1] = log["q"][fast - 50, 1], 0.0
+
+
 def noise_for_v(log: Arrays) -> None:
     log["v"][:, 1] = np.random.default_rng(3).normal(size=len(log["v"]))
 
@@ -78,6 +84,10 @@ WRONG: dict[str, tuple[Callable[[Arrays], None], str]] = {
         r"column q2, row \d+.* stands still for 0.39 s .*while v2 adds up to",
     ),
     "v zero for a while": (freeze("v"), r"column v2, row \d+.* is zero for 0.4 s .*while q2 moves by"),
+    "q and v frozen for a while": (
+        stick,
+        r"column q2, row \d+.* stands still to the last digit for 0.99 s .* jumps by .* stuck; drop these rows",
+    ),
     "v in another order": (swap_velocities, r"column v1 is not the rate of q1 .* v3 is"),
     "v of something else": (noise_for_v, r"column v2 has little to do with the rate of q2"),
     "v of the other sign": (scaled(-1.0, "v"), r"column v1 is -1 times .* opposite sign"),

@@ -33,6 +33,7 @@ def a_log(
         (0.03, 3.5e-4, True),  # differences of the counts themselves, cycle by cycle
         (0.03, 5e-3, False),  # what is rounded so coarsely is worse
         (1e-3, 1e-3, False),
+        (0.015, 1e-4, True),  # of the octave 0.3 % of the speed: a controller that feeds it back feels it
         (2e-3, 0.0, False),  # far noisier, and not felt
         (0.0, 0.0, False),
     ],

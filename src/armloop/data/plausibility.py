@@ -14,6 +14,8 @@ from armloop.data.clock import LEAST_RATE, MOST_RATE, likely_unit, sample_rate
 from armloop.data.dropouts import dropouts, mended
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import (
+    FEWEST_REPEATS,
+    FROZEN,
     accelerations,
     dead_columns,
     disagreements,
@@ -189,6 +191,19 @@ def _clock(log: Recorded) -> Iterator[Finding]:
         )
 
 
+def _stuck_before(time: Array, q: Array, row: int) -> tuple[int, float] | None:
+    """The first row that a position (N,) repeats until it jumps at a row and moves on, and for how long, s; else None.
+
+    A joint that rests, and whose encoder slips then, rests after it, too.
+    """
+    same = np.flatnonzero(q[:row] != q[row - 1])
+    first = int(same[-1]) + 1 if len(same) else 0
+    seconds = float(time[row - 1] - time[first])
+    soon = (time >= time[row]) & (time <= time[row] + FROZEN)
+    moves_on = len(np.unique(q[soon])) > 2
+    return (first, seconds) if seconds >= FROZEN and row - first > FEWEST_REPEATS and moves_on else None
+
+
 def _jumps(log: Recorded) -> Iterator[Finding]:
     """Steps of q that the rates before and after do not explain: wrapped angles, encoders that slip, runs joined."""
     slipped = {(slip.joint, slip.row): slip for slip in slips(log)}
@@ -208,6 +223,17 @@ def _jumps(log: Recorded) -> Iterator[Finding]:
                 change = float(step[row + 1, j])
                 turns = abs(change) / (2 * np.pi)
                 wrapped = round(turns) >= 1 and abs(turns - round(turns)) < 0.02
+                stuck = _stuck_before(log.time[run], q[:, j], row + 2)
+                alone = not (np.delete(jump[row], j) > _JUMP).any()  # not where runs are joined
+                if stuck is not None and alone and not wrapped:
+                    first, seconds = stuck
+                    yield Finding(
+                        f"column q{j + 1}",
+                        f"stands still to the last digit for {seconds:.3g} s from here on and then jumps by "
+                        f"{change:.4g}, as of an encoder that is stuck; drop these rows",
+                        run.start + first,
+                    )
+                    continue
                 slip = slipped.get((j, run.start + row + 2))
                 if slip is not None and not wrapped:
                     words = slip.words(float(log.time[slip.row]))

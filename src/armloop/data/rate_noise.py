@@ -21,8 +21,8 @@ _CORNER, _SAMPLES = 5.0, 8.0
 #: A joint moves that is so fast, rms, rad/s (m/s); where it is slower than this part of that, its encoder may stand still.
 _MOVES, _SLOW = 0.05, 0.5
 #: v stays that has no more than so many times the noise, or noise of no more than this part of the joints' speeds: of
-#: accelerations it is some ten times as much, and attenuates by the square of that.
-_TIMES, _FELT = 2.0, 0.005
+#: accelerations it is some ten times as much, and a controller feeds it back, at another time than the motion's.
+_TIMES, _FELT = 2.0, 0.002
 
 
 class RateNoise(NamedTuple):

@@ -18,8 +18,8 @@ from armloop.util.arrays import TINY, Array, stretches
 _WINDOW, _MOVES = 0.05, 0.05
 # Rate of v (rms, rad/s² or m/s²) from which vdot is judged by it.
 _ACCELERATES = 0.5
-# So long may one column stand still while the other moves, s.
-_FROZEN = 0.2
+# So long may one column stand still while the other moves, s, and so many rows.
+FROZEN, FEWEST_REPEATS = 0.2, 5
 # Windows that are compared at most.
 _WINDOWS = 5_000
 # Lags that are tried, the one from which on it is said, s, and the standard errors from which on it is one.
@@ -171,7 +171,7 @@ def frozen(log: Recorded, integral: Array) -> Iterator[Finding]:
             ):
                 first, last = stretches(same).T
                 length, travel = time[last] - time[first], other[last] - other[first]
-                wrong = (last - first >= 5) & (length >= _FROZEN)
+                wrong = (last - first >= FEWEST_REPEATS) & (length >= FROZEN)
                 wrong &= np.abs(travel) > np.maximum(_MOVES * length, 0.02)
                 for k in np.flatnonzero(wrong)[:1]:
                     moves = f"v{j + 1} adds up to" if kind == "q" else f"q{j + 1} moves by"
