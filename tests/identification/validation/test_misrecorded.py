@@ -57,6 +57,9 @@ def test_units_signs_and_orders_are_told(model: ReconstructedModel, seed: int) -
     assert said(model, other).startswith(
         "joint 2 counts in the direction against the model's and tau's: with q and v of the other sign the model explains"
     )
+    assert said(model, replace(log, tau=log.tau[:, [0, 2, 1]])).startswith(
+        "columns tau2 and tau3 are exchanged: each is what the model gives for the other"
+    )
     assert said(model, exchanged(log, [2, 1, 0], True)).startswith(
         "joints are in another order: taken as 3, 2, 1"
     )

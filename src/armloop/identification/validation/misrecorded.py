@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -67,6 +68,16 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
             "the torques hold no weight, as where the drives compensate it themselves and report the rest: with the weight "
             "of the links added to them the model explains the log; give the whole torque, as in the model's logs"
         )
+    for j, k in combinations(np.flatnonzero(left >= _POOR), 2):
+        order = np.arange(len(left))
+        order[[j, k]] = k, j
+        swapped = replace(samples, tau=samples.tau[:, order])
+        # the other joints are left as they were
+        if _far_better(left, _relative(swapped.tau - predicted, swapped), np.maximum(usual, left)):
+            return (
+                f"columns tau{j + 1} and tau{k + 1} are exchanged: each is what the model gives for the other; put all "
+                "columns in one order"
+            )
     for words, other in _likely(model, samples):
         if _far_better(left, _relative(residual(model, other), other), _usual(model, other)):
             return words
