@@ -116,7 +116,7 @@ class TestTrials:
         effect: Any = SimpleNamespace(
             indices=of.get("indices", (0,)),
             shapes=lambda context: of.get("shapes", [5.0]),
-            plausible=lambda arm, parameters: of.get("plausible", True),
+            possible=lambda arm, parameters, had: of.get("plausible", True),
             resolved=lambda parameters, shapes: of.get("resolved", True),
             estimates=lambda arm, free, spread, value: {},
         )
@@ -138,7 +138,7 @@ class TestTrials:
         )
         # what was known before is nothing beside it, and may be of either sign
         other: Any = SimpleNamespace(
-            plausible=lambda arm, parameters: False, estimates=lambda arm, free, spread, value: {}
+            possible=lambda arm, parameters, had: False, estimates=lambda arm, free, spread, value: {}
         )
         current: Any = SimpleNamespace(effects=(other,), shapes=(Shape.fixed(0.0),))
         of_effects = Known(evidence, np.zeros((4, 2)), current)
@@ -163,12 +163,12 @@ class TestTrials:
             told.append(spread)
             return {"surely": not spread.any(), "free": free, "value": value}
 
-        def plausible(arm: Any, mine: Any) -> bool:
+        def plausible(arm: Any, mine: Any, had: Any) -> bool:
             assert (mine["free"].tolist(), mine["value"]) == ([5.0, 6.0], 8.0)
             return bare if mine["surely"] else with_errors
 
         of: Any = SimpleNamespace(
-            estimates=estimates, plausible=plausible, resolved=lambda mine, tried: tried == [8.0]
+            estimates=estimates, possible=plausible, resolved=lambda mine, tried: tried == [8.0]
         )
         first: Any = SimpleNamespace(estimates=lambda *_: {})
         free = [np.array([4.0]), np.array([5.0, 6.0])]

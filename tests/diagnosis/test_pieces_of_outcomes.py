@@ -102,9 +102,9 @@ class TestOutcomes:
         impossible: set[str] = set()
 
         def fitted(names: str) -> Any:
-            effects = [SimpleNamespace(plausible=lambda arm, own: own not in impossible) for _ in names]
+            effects = [SimpleNamespace(possible=lambda arm, own, had: own not in impossible) for _ in names]
             return SimpleNamespace(
-                clear=errors[names], effects=effects, parameters=[n + names for n in names]
+                clear=errors[names], effects=effects, parameters=[n + names for n in names], had=()
             )
 
         monkeypatch.setattr(
@@ -142,9 +142,11 @@ class TestOutcomes:
         wald = {"a": (9.01, 1), "b": (1.0, 1), "c": (9.01, 2)}
 
         def fitted(names: str) -> Any:
-            effects = [SimpleNamespace(plausible=lambda arm, own: True) for _ in names]
+            effects = [SimpleNamespace(possible=lambda arm, own, had: True) for _ in names]
             chi = tuple(wald[name] for name in names)
-            return SimpleNamespace(clear=(0.5,) * len(names), wald=chi, effects=effects, parameters=names)
+            return SimpleNamespace(
+                clear=(0.5,) * len(names), wald=chi, effects=effects, parameters=names, had=()
+            )
 
         monkeypatch.setattr(
             outcomes,

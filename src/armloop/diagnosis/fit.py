@@ -13,6 +13,7 @@ from scipy.stats import chi2, norm
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
+from armloop.laws.effects.base import Place
 from armloop.model import AddedEffect
 from armloop.regression.clustered import clustered_covariance
 from armloop.regression.embedded import RIDGE, solve, unit_scale
@@ -67,6 +68,7 @@ class Fit:
         solution: the fit on all blocks.
         outside: (FOLDS, R) residual of every weighted row after parameters fitted outside each fold.
         stacked: the rows.
+        had: places of effects that the arm had before.
     """
 
     arm: Arm
@@ -75,6 +77,7 @@ class Fit:
     solution: Solution
     outside: Array
     stacked: Stacked
+    had: frozenset[Place] = frozenset()
 
     def added(self) -> list[AddedEffect]:
         """The effects with their parameters, ready to be composed with the model."""
@@ -100,7 +103,7 @@ class Fit:
         effect, free, value = self.effects[k], self.solution.free[k], self.solution.values[k]
         # most are, whatever their errors
         bare = effect.estimates(self.arm, free, np.zeros((len(free), len(free))), value)
-        possible = effect.plausible(self.arm, bare) or effect.plausible(self.arm, self.parameters[k])
+        possible = any(effect.possible(self.arm, own, self.had) for own in (bare, self.parameters[k]))
         return possible and effect.resolved(bare, tried)
 
     @cached_property
@@ -180,8 +183,9 @@ def fit(
         judged, without = _solved(problem, [s.without[k] for s in shapes], k)
         outside.append(judged.y - judged.X @ without.beta)
     stacked, solution = _solved(problem, [s.final for s in shapes], None)
-    arm = evidence.model.arm
-    return Fit(arm, tuple(effects), tuple(shapes), solution, np.array(outside), stacked)
+    model = evidence.model
+    had = frozenset(added.effect.place for added in model.effects)
+    return Fit(model.arm, tuple(effects), tuple(shapes), solution, np.array(outside), stacked, had)
 
 
 def wald_statistic(x: Array, spread: Array) -> tuple[float, int]:

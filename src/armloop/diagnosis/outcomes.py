@@ -259,7 +259,7 @@ def clear(evidence: Evidence, outcome: Outcome, settled: int = 0, alike: bool = 
         if alike:
             errors = [max(pair) for pair in zip(errors, _together(outcome, settled), strict=True)]
         possible = [
-            effect.plausible(evidence.model.arm, own)
+            effect.possible(evidence.model.arm, own, fitted.had)
             for effect, own in zip(fitted.effects, fitted.parameters, strict=True)
         ]
         errors = [own * fits for own, fits in zip(errors, possible[settled:], strict=True)]

@@ -20,7 +20,7 @@ from armloop.data.motion import Motion
 from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import full_columns
 from armloop.laws.effects import Context, Effect
-from armloop.laws.effects.base import fill
+from armloop.laws.effects.base import Place, fill
 from armloop.laws.friction import FrictionLaw
 from armloop.model.added_effect import AddedEffect, ripples
 from armloop.model.components import COMPONENTS, Component, RigidBody
@@ -415,11 +415,13 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
         history=dict(data["history"]),
         uncertainty=_known(data["uncertainty"]),
     )
+    had: set[Place] = set()
     for added in model.effects:
         try:
-            plausible = added.effect.plausible(arm, added.parameters)
+            plausible = added.effect.possible(arm, added.parameters, had)
         except (TypeError, ValueError, OverflowError) as error:
             raise ModelError(f"effect {added.effect.label()}: a parameter is misshapen: {error}") from error
+        had.add(added.effect.place)
         if not plausible:
             values = ", ".join(f"{key} {e.value}" for key, e in added.parameters.items())
             raise ModelError(f"effect {added.effect.label()}: {values} cannot be; correct it or leave it out")
@@ -432,8 +434,8 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
                 )
     probe = Motion(np.zeros(1), *np.full((3, 1, arm.n), 0.5))
     with np.errstate(all="ignore"):  # the line below says it
-        tau = model.predict(probe)
-    if not np.isfinite(tau).all():
+        finite = np.isfinite(model.predict(probe)).all()
+    if not finite:
         raise ModelError("a coefficient is not a finite number, or so large that the torque is none")
     return model
 
@@ -441,9 +443,7 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
 def _known(value: Any) -> Any:
     """Null, which stands for a standard error that nobody knows, as the number that is none."""
     if isinstance(value, dict):
-        return {
-            key: math.nan if each is None and key in _ERRORS else _known(each) for key, each in value.items()
-        }
+        return {k: math.nan if v is None and k in _ERRORS else _known(v) for k, v in value.items()}
     return [_known(each) for each in value] if isinstance(value, list) else value
 
 

@@ -9,7 +9,7 @@ Most are a :class:`armloop.laws.effects.law.Law`; what is none (a body, a fault 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -362,6 +362,14 @@ class Effect(ABC):
         """Whether the parameters are physically possible."""
         return all(number(parameters[p.name].value) > 0 for p in self.parameters if p.positive)
 
+    def comes_off(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        """Whether parameters, impossible by themselves, are what the same effect has lost that the arm had before."""
+        return False
+
+    def possible(self, arm: Arm, parameters: dict[str, Estimate], had: Collection[Place] = ()) -> bool:
+        """Whether the parameters are physically possible on an arm that had effects at these places before."""
+        return self.plausible(arm, parameters) or (self.place in had and self.comes_off(arm, parameters))
+
     def resolved(self, parameters: dict[str, Estimate], tried: Sequence[float]) -> bool:
         """Whether the run can show the nonlinear parameter found; beyond what was tried it stands for another effect."""
         return True
@@ -415,6 +423,11 @@ def std_errors(derivative: Array, covariance: Array) -> Array:
 def number(value: Value) -> float:
     """The single number of a scalar parameter."""
     return float(np.asarray(value, dtype=float).reshape(()))
+
+
+def less(e: Estimate) -> Estimate:
+    """A scalar parameter that has become less, as by how much."""
+    return Estimate(-number(e.value), e.std_error, e.unit)
 
 
 def fill(arm: Arm, text: str, joint: int | None) -> str:

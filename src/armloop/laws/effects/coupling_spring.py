@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Value, number
+from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Value, less, number
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
 from armloop.robot.arm import Arm
@@ -99,13 +99,24 @@ class CouplingSpring(Law):
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         # A tendon is stretched by both joints, if by one more than by the other.
-        ratio = abs(number(parameters["ratio"].value))
-        return super().plausible(arm, parameters) and _LEAST < ratio < 1 / _LEAST
+        return super().plausible(arm, parameters) and self._stretched_by_both(parameters)
+
+    def comes_off(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        return number(parameters["stiffness"].value) < 0 and self._stretched_by_both(parameters)
+
+    def _stretched_by_both(self, parameters: Mapping[str, Estimate]) -> bool:
+        return _LEAST < abs(number(parameters["ratio"].value)) < 1 / _LEAST
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         k, rest, ratio = (parameters[p.name] for p in self.parameters)
         sign = "-" if number(ratio.value) < 0 else "+"
         factor = Estimate(abs(number(ratio.value)), ratio.std_error, "1").words()
+        if number(k.value) < 0:
+            return (
+                f"the spring over joints {self.joint} and {self.other_joint}, which pulls q{self.joint} {sign} ({factor}) "
+                f"q{self.other_joint} towards {rest.words()}, has become weaker, by {less(k).words()}: it is worn, or "
+                "broken, or was taken off"
+            )
         return (
             f"a spring over joints {self.joint} and {self.other_joint} pulls q{self.joint} {sign} ({factor}) "
             f"q{self.other_joint} towards {rest.words()} with {k.words()}"

@@ -7,14 +7,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Estimate, Parameter, number
+from armloop.laws.effects.base import Array, Estimate, Parameter, less, number
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
 from armloop.robot.arm import Arm
 
 
 class JointSpring(Law):
-    """tau_j += k (q_j − q_0)."""
+    """tau_j += k (q_j − q_0).
+
+    Of a spring that the model has, k < 0 is what it has lost (worn, broken, taken off); without one it is impossible.
+    """
 
     name = "joint_spring"
     parameters = (Parameter("stiffness", "TAU/POS", least=0.0, positive=True), Parameter("rest", "POS"))
@@ -50,11 +53,22 @@ class JointSpring(Law):
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         # A spring pulls back; one that pushes away, or whose rest position the joint is nowhere near, is none.
+        return super().plausible(arm, parameters) and self._rests_within_reach(arm, parameters)
+
+    def comes_off(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        return number(parameters["stiffness"].value) < 0 and self._rests_within_reach(arm, parameters)
+
+    def _rests_within_reach(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         reach = 2 * np.pi if arm.joints[self.index].kind == "revolute" else 2.0
-        return super().plausible(arm, parameters) and abs(number(parameters["rest"].value)) < reach
+        return abs(number(parameters["rest"].value)) < reach
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         k, rest = parameters["stiffness"], parameters["rest"]
+        if number(k.value) < 0:
+            return (
+                f"the spring that pulls joint {self.joint} towards {number(rest.value):.3f} ± {number(rest.std_error):.2g} "
+                f"{rest.unit} has become weaker, by {less(k).words()}: it is worn, or broken, or was taken off"
+            )
         return (
             f"a spring pulls joint {self.joint} towards {number(rest.value):.3f} ± {number(rest.std_error):.2g} "
             f"{rest.unit} with {k.words()}"
