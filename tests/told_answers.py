@@ -185,4 +185,4 @@ def judged(jobs: int | None = None) -> Any:
     return diagnose(model, logs, jobs=jobs)
 
 
-CONTACT = SimpleNamespace(added="push", rows=np.zeros(4, dtype=bool))
+CONTACT = SimpleNamespace(added="push", rows=np.zeros(4, dtype=bool), clear=9.0)

@@ -14,7 +14,8 @@ from armloop.diagnosis.suspected import Suspected
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.verdict import Diagnosis
 from armloop.laws.effects import effect
-from armloop.model import ReconstructedModel
+from armloop.laws.effects.events import interval
+from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.errors import InputError
 from armloop.util.finite import finite
 
@@ -255,7 +256,7 @@ def test_what_the_models_own_errors_hide_is_said_of_a_joint_of_which_more_is_lef
 def test_what_is_outweighed_by_an_unknown_rest_goes_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two effects, of which the first goes, and with it one of two events; the other is asked with what is left."""
     spring, load = (SimpleNamespace(effect=SimpleNamespace(label=lambda: "spring"), share=0.25), "load")
-    other = SimpleNamespace(added="other push", rows=np.zeros(4, dtype=bool))
+    other = SimpleNamespace(added="other push", rows=np.zeros(4, dtype=bool), clear=2.0)
     answers = Answers(monkeypatch, found=[spring, load], contacts=[CONTACT, other], unknown=True)
     asked: list[Any] = []
 
@@ -287,7 +288,7 @@ def test_an_event_that_may_be_of_an_unknown_rest_goes_and_is_told(
     form: str, joints: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A residual that the verdict names is a rest as long as it has no law."""
-    other = SimpleNamespace(added="other push", rows=np.zeros(4, dtype=bool))
+    other = SimpleNamespace(added="other push", rows=np.zeros(4, dtype=bool), clear=2.0)
     unlisted = SimpleNamespace(joint=3, parameters={"law": form} if form else {}, instead="", added=list)
     Answers(monkeypatch, contacts=[CONTACT, other], unlisted=unlisted)
     asked: list[Any] = []
@@ -302,6 +303,18 @@ def test_an_event_that_may_be_of_an_unknown_rest_goes_and_is_told(
     assert asked[0] == ("account", ("with", "push", "other push"), "push", joints)
     assert made.contacts == [CONTACT] and made.model == ("with", "push")
     assert made.reasons[:2] == ["other push in doubt", "stands"]
+
+
+def test_an_event_within_two_errors_of_none_goes_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    torque = AddedEffect(effect("external_torque", 2), interval(3.0, 4.0, (0.1, 0.1), np.zeros(3), "rad"))
+    vague = SimpleNamespace(added=torque, rows=np.zeros(4, dtype=bool), clear=1.9)
+    answers = Answers(monkeypatch, contacts=[CONTACT, vague])
+    made = judged()
+    assert made.contacts == [CONTACT] and made.model == ("with", "push")
+    said = "from 3.0 to 4.0 s external_torque at joint 2 would explain what is left, but it is 1.9 of its stated errors"
+    assert made.reasons[0].startswith(said)
+    vague.clear = 2.0
+    assert judged().contacts == [CONTACT, vague] and answers.asked["found"]
 
 
 def test_what_is_left_is_judged_where_joints_slide_and_what_is_found_at_reversals_is_not_asked(

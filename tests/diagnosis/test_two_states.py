@@ -48,6 +48,12 @@ def test_what_is_short_is_none_and_a_change_within_rest_is_where_it_explains_mos
     assert interval.start == pytest.approx(11.3, abs=0.05) and interval.end == motion.time[-1]
     assert unknown[(motion.time > 10) & (motion.time < 12)].all()
     assert not unknown[(motion.time > 13) | ((motion.time > 5) & (motion.time < 9))].any()
+    # nor where the samples on either side of a change hardly tell
+    counted = np.where(loaded, 9.0, -9.0)
+    counted[(time > 9) & (time < 13)] *= 1e-4
+    early = (time > 9.5) & (time > 4.3)
+    (interval,), _ = two_states.intervals_of(own, early, run_of, better, counted)
+    assert interval.start == pytest.approx(11.3, abs=0.05) and interval.gap == pytest.approx(4.0, abs=0.1)
     (interval,), _ = two_states.intervals_of(own, time < 10, run_of, -better)
     assert interval.start == motion.time[0] and interval.end == pytest.approx(11.3, abs=0.05)
 
@@ -64,3 +70,12 @@ def test_logs_whose_clocks_have_nothing_to_do_with_each_other() -> None:
     for first, last, beyond in ((16, 34, 36), (76, 100, 100)):
         assert large[first:last].all() and not large[first - 6 : first - 2].any()
         assert not large[beyond : beyond + 6].any()
+
+
+def test_a_sample_that_hardly_tells_is_no_end_of_where_a_change_lies() -> None:
+    """It is sure from where the log-likelihood is 4.5, three deviations, less; and no change moves beyond another."""
+    gains = np.array([-9.0, -9, -0.1, -4, 0.1, 1, 3, 0.2, 0.3, 9, 9])
+    assert two_states._sure(gains, 4, [4, 11]) == (1, 8)
+    assert two_states._sure(gains, 4, [0, 4, 7]) == (1, 6)
+    assert two_states._sure(gains[2:], 2, [2, 9]) == (0, 6)
+    assert two_states._sure(np.array([-9.0, 9.0]), 1, [1, 2]) == (0, 1)

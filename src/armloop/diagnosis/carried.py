@@ -131,7 +131,7 @@ def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
     left = evidence.residual([])
     with_load = left - smooth(evidence.samples, load.columns(evidence.context, 0.0) @ found.theta)
     better = ((left**2 - with_load**2) / evidence.scale**2).sum(axis=1)
-    intervals, unknown = intervals_of(evidence, found.there, run, better)
+    intervals, unknown = intervals_of(evidence, found.there, run, better, found.gains)
     if not intervals:
         return None
     edge = max(evidence.samples.period, evidence.samples.reach, *(own.gap / 2 for own in intervals))

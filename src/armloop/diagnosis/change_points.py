@@ -22,6 +22,7 @@ from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import LOG_ODDS, TELLING, log_prior, told
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect
+from armloop.laws.effects.encoder_offset import EncoderOffset
 from armloop.laws.effects.onset import Onset, log_of
 from armloop.laws.effects.spells import Spells
 from armloop.util.arrays import TINY, Array, Index, Mask
@@ -181,6 +182,7 @@ class ChangePoints:
         """Standard error of an instant, s: how far off the profile is worse by what one observation tells.
 
         Neighbouring samples of what is left are no observations of their own: as many as its correlation lasts are one.
+        Where an angle's record steps, the rates and the torques that are made of it ring for as long as two filters reach.
         """
         cuts, order = self._cuts(part), self._order(part)
         squares = self._gates(part).left(order, cuts, part.until, self._fixed(part)).sum(axis=1)
@@ -191,7 +193,8 @@ class ChangePoints:
         beyond = np.flatnonzero(worse)
         low = cuts[max([0, *beyond[beyond < at]])]
         high = cuts[min([len(cuts) - 1, *beyond[beyond > at]])]
-        return float(time[high] - time[low]) / 2
+        rings = 2 * self.evidence.samples.reach if isinstance(part.effect, EncoderOffset) else 0.0
+        return float(np.hypot(float(time[high] - time[low]) / 2, rings))
 
     def gradual(self, part: Part, cut: int) -> bool:
         """Whether an effect that grows, or wanes, all along does as well as one that steps: then it has no instant."""

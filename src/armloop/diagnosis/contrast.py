@@ -83,7 +83,10 @@ def pulses(samples: Samples, innovation: Array, judged: Mask) -> list[Pulse]:
 
 
 def beside(samples: Samples, residual: Array, rows: slice) -> Array:
-    """(N, n) residual less the line through what is left before and after a stretch."""
+    """(N, n) residual less, from before a stretch to after it, the line through what is left there.
+
+    What is left at other times, by which an event of the stretch is judged, stays as it is.
+    """
     length, gap = rows.stop - rows.start, round(2 * samples.reach / samples.period)
     run = samples.motion.run_of(rows.start)
     before = slice(max(run.start, rows.start - gap - length), max(run.start + 1, rows.start - gap))
@@ -92,7 +95,10 @@ def beside(samples: Samples, residual: Array, rows: slice) -> Array:
     ends = [float(time[part].mean()) for part in (before, after)]
     levels = [residual[part].mean(axis=0) for part in (before, after)]
     line = levels[0] + (time[:, None] - ends[0]) / (ends[1] - ends[0]) * (levels[1] - levels[0])
-    return np.asarray(residual - line)
+    near = slice(before.start, after.stop)
+    found = residual.copy()
+    found[near] -= line[near]
+    return np.asarray(found)
 
 
 def _peaks(level: Array, apart: int) -> list[int]:

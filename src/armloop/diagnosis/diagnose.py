@@ -19,6 +19,7 @@ from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.homogeneity import are_unlike, as_modelled, is_contradicted, leaves_much, names_of
+from armloop.diagnosis.judgement import CHANCE
 from armloop.diagnosis.onset import account_with_onsets
 from armloop.diagnosis.outcomes import (
     Outcome,
@@ -32,6 +33,7 @@ from armloop.diagnosis.outcomes import (
 )
 from armloop.diagnosis.reasons import (
     event_in_doubt,
+    event_unclear,
     event_untold,
     in_doubt,
     masked,
@@ -253,11 +255,15 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
         # a residual without a law is all there, though the verdict names it
         rest = (*stand.left, *(law.joint - 1 for law in laws if not law.parameters))
         slides = evidence.only(sliding)
-        drowning = [each for each in contacts if drowned(slides, augmented, each, rest)]
-        if not drowning:
+        unclear = [each for each in contacts if each.clear < CHANCE]
+        drowning = [
+            each for each in contacts if each not in unclear and drowned(slides, augmented, each, rest)
+        ]
+        if not drowning and not unclear:
             break
+        doubted += [event_unclear(each.added, each.clear) for each in unclear]
         doubted += [event_in_doubt(each.added) for each in drowning]
-        contacts = [each for each in contacts if each not in drowning]
+        contacts = [each for each in contacts if each not in drowning and each not in unclear]
     doubted += masked(
         [f.effect.label() for f, _ in outcome.masked if _is_left(f.effect, outcome, stand.left)]
     )

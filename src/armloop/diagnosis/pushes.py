@@ -47,6 +47,7 @@ class Contact:
         shown: joints (0-based) that it was noticed at.
         contradicted: whether it surely leaves more than there was, by more than the model's own shortcomings, of joints
             that the event was not noticed at.
+        clear: how many standard errors its clearest component is from zero, if it acts where it is said to.
     """
 
     added: AddedEffect
@@ -58,6 +59,7 @@ class Contact:
     rivals: list[tuple[Effect, float]] = field(default_factory=list)
     contradicted: bool = False
     shown: frozenset[int] = frozenset()
+    clear: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,6 +309,7 @@ def _trial(
         own,
         contradicted=leaves_more(would_be, was, enough(evidence, was)),
         shown=frozenset(shown),
+        clear=float(np.max(np.abs(size) / np.maximum(error, TINY))),
     )
 
 

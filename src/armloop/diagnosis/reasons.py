@@ -227,6 +227,15 @@ def event_in_doubt(event: AddedEffect) -> str:
     )
 
 
+def event_unclear(event: AddedEffect, clear: float) -> str:
+    """A sentence on an event that is within two of its stated errors of none (Wald test)."""
+    start, end = ends(event.parameters)
+    return (
+        f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but it is {clear:.1f} of its "
+        "stated errors from none, which hold what is left at other times: it is not stated"
+    )
+
+
 def event_untold(event: AddedEffect) -> str:
     """A sentence on an event of a run that is too short to tell it from a law."""
     start, end = ends(event.parameters)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.judgement import SIGNIFICANCE
 from armloop.laws.effects.spells import Interval
 from armloop.regression.embedded import ITERATIONS, ridge
 from armloop.regression.moments import Moments
@@ -21,6 +22,8 @@ from armloop.util.arrays import Array, Index, Mask, stretches
 _PRICE = 40.0
 #: What is there, or is not there, for less than this part of a run, or of this many seconds at a time, is none.
 _LEAST, _SHORTEST = 0.05, 0.4
+#: Log-likelihood of three standard deviations.
+_SURELY = 0.5 * SIGNIFICANCE**2
 #: Seconds over which the residual's size is averaged to begin with.
 _WINDOW = 0.5
 
@@ -28,13 +31,14 @@ _WINDOW = 0.5
 class TwoStates(NamedTuple):
     """Samples (K,) in which something is there, its coefficients (p,), the residual (K, n) without it, and what it explains.
 
-    That is log-likelihood, less the price of its changes.
+    That is log-likelihood, less the price of its changes; ``gains`` (K,) are what each sample tells for its being there.
     """
 
     there: Mask
     theta: Array
     rest: Array
     worth: float
+    gains: Array
 
 
 def two_states(
@@ -69,7 +73,7 @@ def two_states(
             gains = 0.5 * (rest**2 - (rest - X @ beta[:p]) ** 2).sum(axis=1)
             before, there = there, likeliest(gains, run)
             explained = worth(gains, there, run) + 0.5 * float((nothing**2).sum() - (rest**2).sum())
-            found = TwoStates(there, beta[:p], rest, explained)
+            found = TwoStates(there, beta[:p], rest, explained, gains)
             if (before == there).all():
                 break
         if found is not None and found.there.any() and found.worth > (best.worth if best else 0.0):
@@ -120,13 +124,17 @@ def worth(gains: Array, there: Mask, run: Index) -> float:
     return float(gains[there].sum()) - _PRICE * float(changes.sum())
 
 
-def intervals_of(evidence: Evidence, there: Mask, run: Index, better: Array) -> tuple[list[Interval], Mask]:
+def intervals_of(
+    evidence: Evidence, there: Mask, run: Index, better: Array, gains: Array | None = None
+) -> tuple[list[Interval], Mask]:
     """When it is there, and (N,) samples around its coming and going.
 
     Between two samples that count, where the arm may rest for a while, it changes where that explains most of all samples.
+    A sample that hardly tells, such as of a joint that bears nothing of it, is none of the two.
 
     Args:
         better: (N,) squared error that it removes of each sample while it is there.
+        gains: (K,) what each sample that counts tells for its being there, log-likelihood; None if every one tells enough.
     """
     motion, kept, found = evidence.samples.motion, evidence.kept, []
     unknown = np.zeros(motion.samples, dtype=bool)
@@ -134,12 +142,16 @@ def intervals_of(evidence: Evidence, there: Mask, run: Index, better: Array) -> 
     for number, rows in enumerate(motion.runs(), 1):
         mine = np.flatnonzero(run == number)
         ends, gaps = [], []
-        for edge in stretches(there[mine]).ravel().tolist():
+        edges = stretches(there[mine]).ravel().tolist()
+        for edge in edges:
             if edge in (0, len(mine)):  # it is there from the run's start, or to its end
                 ends.append(rows.start if edge == 0 else rows.stop - 1)
                 gaps.append(0.0)
                 continue
-            low, high = int(kept[mine[edge - 1]]), int(kept[mine[edge]])
+            first, last = edge - 1, edge
+            if gains is not None:
+                first, last = _sure(gains[mine] * (1 if there[mine[edge]] else -1), edge, edges)
+            low, high = int(kept[mine[first]]), int(kept[mine[last]])
             # before it ceases, and after it begins, it explains what is left
             sums = np.cumsum(better[low : high + 1]) * (-1 if there[mine[edge]] else 1)
             ends.append(low + int(np.argmax(sums)))
@@ -150,3 +162,19 @@ def intervals_of(evidence: Evidence, there: Mask, run: Index, better: Array) -> 
             if stop - start >= _SHORTEST:
                 found.append(Interval(start, stop, tuple(motion.q[begin].tolist()), gap=gap))
     return found, unknown
+
+
+def _sure(gains: Array, edge: int, edges: list[int]) -> tuple[int, int]:
+    """The samples between which a change lies: it is less likely before the one, and after the other, by three deviations.
+
+    Args:
+        gains: (M,) log-likelihood that each sample gives to its being after the change.
+        edges: the likeliest places of all changes, the first samples after them; none moves beyond another.
+    """
+    k = edges.index(edge)
+    low = edges[k - 1] if k else 0
+    high = edges[k + 1] - 1 if k + 1 < len(edges) else len(gains) - 1
+    later = np.cumsum(gains[edge : high + 1]) > _SURELY
+    earlier = np.cumsum(-gains[low:edge][::-1]) > _SURELY
+    last = edge + int(np.argmax(later)) if later.any() else high
+    return edge - 1 - (int(np.argmax(earlier)) if earlier.any() else edge - 1 - low), last
