@@ -4,6 +4,7 @@ import pytest
 
 from armloop.diagnosis.verdict import why_alike
 from armloop.laws.effects import effect
+from armloop.laws.effects.onset import Onset
 
 
 @pytest.mark.parametrize(
@@ -31,3 +32,27 @@ from armloop.laws.effects import effect
 def test_the_sentence_names_what_would_tell_them_apart(found, rival, says):
     words = why_alike(effect(*found), effect(*rival))
     assert says in words and "\n" not in words
+
+
+#: An effect of an interval of a run, which is an event of it.
+_FOR_A_TIME = effect("torque_offset", 2).within(Onset(12.0, 0.1, until=True, posture=(0.0, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("found", "rival"),
+    [
+        (effect("external_torque", 2), effect("external_contact", None)),
+        (effect("carried_load", None), effect("external_torque", 2)),
+        (_FOR_A_TIME, effect("external_contact", None)),
+    ],
+)
+def test_no_further_run_is_said_to_tell_what_an_event_was(found, rival):
+    for words in (why_alike(found, rival), why_alike(rival, found)):
+        assert "no further run tells them apart" in words and "--next-run" not in words
+
+
+def test_of_an_event_and_an_effect_that_lasts_a_further_run_shows_the_latter():
+    spring = effect("joint_spring", 2)
+    for words in (why_alike(_FOR_A_TIME, spring), why_alike(spring, _FOR_A_TIME)):
+        assert "a further run tells whether joint_spring at joint 2 is still there" in words
+        assert "without torque_offset at joint 2, which was an event" in words

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from armloop.diagnosis import Diagnosis, close
+from armloop.diagnosis.pushes import Contact
 from armloop.drake.experiments.metrics import Metrics
 from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect
 from armloop.reports import findings as findings_module
 from armloop.reports.diagnosis_tables import diagnosis_table, events_table
-from armloop.reports.findings import findings, nothing_to_supply
+from armloop.reports.findings import alternatives, findings, nothing_to_supply
 from armloop.reports.tables import (
     eta_table,
     formulas,
@@ -150,6 +151,31 @@ def test_what_cannot_be_told_apart_comes_with_the_motion_that_could(loop: Simple
         in text
     )
     assert "a run over a larger range of the joint would tell them apart" in text
+
+
+def test_events_with_the_same_alternative_are_told_of_together(loop: SimpleNamespace) -> None:
+    """Each with its number in the table of events; another joint's stands apart, and what was found has none."""
+    rival, none = effect("external_contact", None), np.zeros(0)
+
+    def event(joint: int, share: float) -> Contact:
+        times = {key: Estimate(1.0, 0.1, "s") for key in ("start", "end")}
+        added = AddedEffect(effect("external_torque", joint), {**times, "torque": Estimate(2.0, 0.1, "N*m")})
+        return Contact(added, none, none, none, 0.9, 0.9, [(rival, share)])
+
+    (found,) = loop.diagnosis.outcome.found
+    outcome = replace(
+        loop.diagnosis.outcome, found=[replace(found, rivals=[(effect("torque_offset", 2), 0.97)])]
+    )
+    events = [event(2, 0.61), event(3, 0.7), event(2, 0.92)]
+    told = replace(loop.diagnosis, outcome=outcome, contacts=events)
+    text = " ".join(diagnosis_table(told).split())
+    assert (
+        "cannot tell external torque, joint 2 (events 1 and 3) from - external contact (61 % to 92 %): on"
+        in text
+    )
+    assert "cannot tell external torque, joint 3 (event 2) from - external contact (70 %): on" in text
+    assert "cannot tell joint spring, joint 2 from" in text
+    assert text.count("no further run tells them apart") == 2 == len(alternatives(told)) - 1
 
 
 def test_long_formulas_say_that_they_are_cut(loop: SimpleNamespace) -> None:

@@ -217,14 +217,23 @@ def _alternatives(effect: Effect, confounded: list[tuple[Effect, float]]) -> lis
 
 
 def why_alike(found: Effect, rival: Effect) -> str:
-    """Why two effects can look alike on one motion, and which motion would tell them apart: a sentence."""
+    """Why two effects can look alike on one motion, and what would tell them apart: a sentence."""
+    alike = f"on this motion {rival.label()} explains held-out data nearly as well as {found.label()}"
+    if found.event and rival.event:
+        return (
+            f"{alike}; what was there for a time is over, and no further run tells them apart: only what is known of "
+            "that time does, such as what touched the arm, and where"
+        )
+    if found.event or rival.event:
+        lasting, over = (rival, found) if found.event else (found, rival)
+        return (
+            f"{alike}; a further run tells whether {lasting.label()} is still there, without {over.label()}, which was "
+            "an event of this run"
+        )
     listed = _said(found, rival)
     if listed and (found.joint is None or rival.joint is None or found.joint == rival.joint):
         return listed
-    return (
-        f"on this motion {rival.label()} explains held-out data nearly as well as {found.label()}; a run over other "
-        "postures and speeds may tell them apart: armloop diagnose --next-run designs one"
-    )
+    return f"{alike}; a run over other postures and speeds may tell them apart: armloop diagnose --next-run designs one"
 
 
 def _said(found: Effect, rival: Effect) -> str | None:

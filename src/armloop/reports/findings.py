@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -113,15 +113,41 @@ def blame(diagnosis: Diagnosis) -> list[str]:
 
 
 def confounded(diagnosis: Diagnosis) -> list[tuple[str, list[tuple[str, str]]]]:
-    """For each effect found: what this motion cannot tell from it, with its share, and why and which motion could."""
+    """For each effect found: what this motion cannot tell from it, with its share, and why and what could.
+
+    Events of one kind with the same alternatives stand together, by their numbers in the table of events.
+    """
+    alike: dict[object, list[tuple[int, dict[str, Any]]]] = {}
+    before = len(diagnosis.outcome.found)
+    for k, found in enumerate(diagnosis.to_dict()["effects"]):
+        number = k - before + 1 if before <= k < before + len(diagnosis.contacts) else 0
+        others = tuple((place(r), r["why"]) for r in found["alternatives"])
+        if others:
+            alike.setdefault((place(found), others if number else k), []).append((number, found))
     return [
         (
-            place(effect),
-            [(f"{place(r)} ({percent(r['share'])})", str(r["why"])) for r in effect["alternatives"]],
+            place(each[0][1]) + _numbered([number for number, _ in each if number]),
+            [
+                (
+                    f"{place(r)} ({_shares([one['alternatives'][i]['share'] for _, one in each])})",
+                    str(r["why"]),
+                )
+                for i, r in enumerate(each[0][1]["alternatives"])
+            ],
         )
-        for effect in diagnosis.to_dict()["effects"]
-        if effect["alternatives"]
+        for each in alike.values()
     ]
+
+
+def _numbered(events: list[int]) -> str:
+    """Events by their numbers, in brackets; nothing of what is no event."""
+    return f" (event{'s' * (len(events) > 1)} {listed([str(k) for k in events])})" if events else ""
+
+
+def _shares(shares: list[float]) -> str:
+    """Parts of what can be explained: one, or the least and the largest."""
+    least, most = percent(min(shares)), percent(max(shares))
+    return least if least == most else f"{least} to {most}"
 
 
 def alternatives(diagnosis: Diagnosis) -> list[str]:
