@@ -15,7 +15,7 @@ from armloop.diagnosis import unlisted
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead_of
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import LOG_ODDS
-from armloop.laws.effects import hypotheses
+from armloop.laws.effects import Estimate, hypotheses
 
 
 class TestLawThatIsNotListed:
@@ -334,3 +334,10 @@ class TestLawThatIsNotListed:
         ends_of = {"q_low": [1.0, -7.0], "q_high": [2.0, -5.0], "v_low": [-0.1, 0.2], "v_high": [0.1, 0.3]}
         assert {key: wider[key].value for key in ends_of} == ends_of
         assert {key: stated[key].value for key in ends_of} == ends_of
+
+    def test_its_entry_has_a_sentence_with_the_law_or_that_there_is_none(self) -> None:
+        law = {"v2": Estimate(2.0, 0.1, "N*m*s/rad"), "q_low": Estimate([0.0, 0.0], [0.0, 0.0], "rad")}
+        words = unlisted.Unlisted(2, 1.0, 0.5, "2*v2", 0.6, law).to_dict()["words"]
+        assert words.startswith("joint 2 follows a law that is not listed: (2 ± 0.1) v2")
+        words = unlisted.Unlisted(2, 1.5, 0.5, "", 1.5).to_dict()["words"]
+        assert words.startswith("joint 2 follows no law") and "3 times the baseline" in words

@@ -95,6 +95,16 @@ class Unlisted:
         }
         return replace(self, parameters=wider)
 
+    def sentence(self) -> str:
+        """The law in words, or that there is none."""
+        if added := self.added():
+            return added[0].sentence()
+        times = self.rmse / self.baseline
+        return (
+            f"joint {self.joint} follows no law that both halves of the run agree on: what the model leaves of it, "
+            f"{times:.2g} times the baseline, is accounted for by no listed effect"
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``diagnosis.json``."""
         return {
@@ -102,6 +112,7 @@ class Unlisted:
             "joint": self.joint,
             "form": self.form,
             "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
+            "words": self.sentence(),
             "rmse": {"residual": self.rmse, "with_form": self.rmse_with_form, "baseline": self.baseline},
             "alternatives": [],
         }

@@ -60,6 +60,7 @@ class FoundData(Struct):
     share: Share | None = None
     alternatives: list[AlternativeData] = []
     parameters: dict[str, Any] = {}
+    words: Annotated[Text | UnsetType, Meta(description="a sentence on it")] = UNSET
     form: Text | UnsetType = UNSET
     adopted: bool | UnsetType = UNSET
     when: Name | UnsetType = UNSET
