@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 
 #: Where each public name is found.
 _PLACES = {
+    "Comparison": "armloop.api.score",
     "Diagnosis": "armloop.api.diagnosis",
     "InputError": "armloop.util.errors",
     "Model": "armloop.api.model",

@@ -7,6 +7,7 @@ from armloop.api.model import load_model as load_model
 from armloop.api.model import reconstruct as reconstruct
 from armloop.api.reading import read_log as read_log
 from armloop.api.reading import read_logs as read_logs
+from armloop.api.score import Comparison as Comparison
 from armloop.api.score import Score as Score
 from armloop.api.score import evaluate as evaluate
 from armloop.api.tracking import Tracking as Tracking

@@ -16,6 +16,7 @@ from armloop.commands.excite import Excite
 from armloop.commands.options import Option
 from armloop.commands.reconstruct import Reconstruct
 from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
 from armloop.experiment.design import Settings
 from armloop.identification.reconstruction import Options as ReconstructionOptions
 from armloop.regression.sparse import Sparse
@@ -119,6 +120,24 @@ def test_a_model_scores_plots_and_shows_itself(model, tmp_path):
     with pytest.raises(InputError, match="report"):
         again.report(tmp_path / "other.html")
     assert again.export("c", tmp_path / "arm.c").files == [tmp_path / "arm.c"]
+
+
+def test_a_log_is_compared_sample_by_sample_as_it_is_scored(model):
+    logs = [run(20, 4), run(15, 5)]
+    seen = model.compare(logs)
+    N = len(seen.time)
+    for each in (seen.q, seen.v, seen.vdot, seen.measured, seen.predicted, seen.residual, seen.moving):
+        assert each.shape == (N, 3)
+    assert len(seen.starts) == 2 and repr(seen) == f"<armloop.Comparison of {N} samples of 3 joints, 2 runs>"
+    squares = np.where(seen.moving, seen.residual**2, 0.0).sum(axis=0) / seen.moving.sum(axis=0)
+    assert np.sqrt(squares) == pytest.approx(model.score(logs).rmse, rel=1e-9)
+    # at the log's own times: what was measured there, but for the filter
+    own = slice(*seen.starts)
+    tau = np.interp(seen.time[own], logs[0].time, logs[0].tau[:, 1])
+    assert np.corrcoef(tau, seen.measured[own, 1])[0, 1] > 0.99
+    # the motion is that of a Motion: what is predicted of it is the same before the filter
+    motion = Motion(seen.time, seen.q, seen.v, seen.vdot, seen.starts)
+    assert np.corrcoef(model.predict(motion)[:, 1], seen.predicted[:, 1])[0, 1] > 0.99
 
 
 def test_what_is_in_amperes_is_said_to_be(model, tmp_path):

@@ -181,7 +181,7 @@ WRONG: dict[str, tuple[Call, str]] = {
     ),
     "no seconds to plot": (lambda x: x.model.plot(x.run, seconds=None), "seconds must be a finite number"),
     "arrays in place of a motion": (lambda x: x.model.predict(x.run.q), "predict takes a Motion .*ndarray"),
-    "a log in place of a motion": (lambda x: x.model.predict(x.run), "For a log: model.score"),
+    "a log in place of a motion": (lambda x: x.model.predict(x.run), r"For a log: model.compare\(log\)"),
     "a step that is none": (
         lambda x: x.model.feedforward(*np.zeros((3, 3)), step=0),
         "step is 0; it must be 1, 2 or 3",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armloop.api.reading import as_arm, as_logs
-from armloop.api.score import Score, evaluate, samples_for
+from armloop.api.score import Comparison, Score, evaluate, samples_for
 from armloop.api.shown import displayed, page
 from armloop.commands.reconstruct import Reconstruct as Command
 from armloop.commands.reconstruct import require_ratios_used
@@ -41,7 +41,8 @@ if TYPE_CHECKING:
 class Model(ReconstructedModel):
     """A reconstructed model of an arm's joint torques.
 
-    ``predict(motion)`` gives torques (N, n) for arrays of samples, ``feedforward(q, v, vdot)`` (n,) for one;
+    ``compare(log)`` gives measured and predicted torques (N, n) of a log, ``predict(motion)`` those of arrays of samples
+    (``armloop.data.motion.Motion``), ``feedforward(q, v, vdot)`` (n,) those of one;
     ``formulas()`` one readable formula per joint; ``save(path)`` writes the file that commands read. Without the logs
     it was made of (a model read from its file) ``account`` is None, and ``report`` has nothing to tell.
     """
@@ -59,6 +60,14 @@ class Model(ReconstructedModel):
     def score(self, logs: MotionLog | Sequence[MotionLog]) -> Score:
         """Errors on logs; see :func:`armloop.evaluate`."""
         return evaluate(self, logs)
+
+    def compare(self, logs: MotionLog | Sequence[MotionLog]) -> Comparison:
+        """Measured and predicted torque of logs, sample by sample, filtered as :func:`armloop.evaluate` does it.
+
+        Raises:
+            InputError: a log does not fit the model's arm or its unit of torque, or is too short for the filter.
+        """
+        return Comparison.of(self, logs)
 
     def plot(self, logs: MotionLog | Sequence[MotionLog] | None = None, *, seconds: float = 20.0) -> Figure:
         """Measured and predicted torque of each joint over the first seconds of the longest run, a matplotlib figure.

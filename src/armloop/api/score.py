@@ -1,4 +1,4 @@
-"""Prediction error of a model on logs, as an object."""
+"""Prediction error of a model on logs, as objects: per joint, and sample by sample."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.signals import preprocess
 from armloop.identification.scoring import Score as Numbers
-from armloop.identification.scoring import score
+from armloop.identification.scoring import residual, score
 from armloop.model import ReconstructedModel
 from armloop.reports.tables import score_table
+from armloop.reports.words import counted
 from armloop.robot.arm import Arm
 from armloop.robot.plausibility import say_beyond_limits
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import InputError
 from armloop.util.files import write_text
 
@@ -69,6 +71,50 @@ class Score(Numbers):
         assert self.arm is not None
         write_text(path, score_report(self, self.arm, self.units))
         return Path(path)
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison:
+    """Measured and predicted torque of logs, sample by sample, as :func:`armloop.evaluate` compares them.
+
+    Both have passed the filter that the model was made with: samples are thinned to what the filter leaves, its reach is
+    cut off at the ends of each run, and vdot is derived where the log has none.
+
+    Attributes:
+        time: (N,) the logs' own clocks, s, run after run.
+        starts: first sample of each run; a log is one run or several.
+        q, v, vdot: (N, n) the motion that the model was asked about, rad (m), and per second once and twice.
+        measured, predicted: (N, n) torque, in ``units``.
+        moving: (N, n) samples of joints that slide, by which a model is judged; at rest friction may be anything.
+        units: (n,) N*m, N for a prismatic joint, or A.
+    """
+
+    time: Array
+    starts: Index
+    q: Array
+    v: Array
+    vdot: Array
+    measured: Array
+    predicted: Array
+    moving: Mask
+    units: tuple[str, ...]
+
+    @property
+    def residual(self) -> Array:
+        """(N, n) measured minus predicted torque."""
+        return self.measured - self.predicted
+
+    def __repr__(self) -> str:
+        samples, joints = self.measured.shape
+        return f"<armloop.Comparison of {samples} samples of {joints} joints, {counted(len(self.starts), 'run')}>"
+
+    @staticmethod
+    def of(model: ReconstructedModel, logs: MotionLog | Sequence[MotionLog]) -> Comparison:
+        """Ask a model about the samples of logs; see :meth:`armloop.Model.compare`."""
+        samples = samples_for(model, as_logs(logs))
+        motion, predicted = samples.motion, samples.tau - residual(model, samples)
+        state = motion.time, motion.starts, motion.q, motion.v, motion.vdot
+        return Comparison(*state, samples.tau, predicted, samples.moving, tuple(model.torque_units))
 
 
 def evaluate(model: ReconstructedModel, logs: MotionLog | Sequence[MotionLog]) -> Score:

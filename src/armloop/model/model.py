@@ -338,7 +338,7 @@ class ReconstructedModel:
         if not isinstance(motion, Motion):
             raise ModelError(
                 f"predict takes a Motion (armloop.data.motion) of arrays; this is of type {type(motion).__name__}. "
-                "For a log: model.score(log), model.plot(log)"
+                "For a log: model.compare(log), model.score(log), model.plot(log)"
             )
         _check_step(step)
         if motion.joints != self.arm.n:
