@@ -7,6 +7,7 @@ from foreign_logs import assert_same, motion
 from armloop.cli import main
 from armloop.convert import Answers, convert
 from armloop.convert.headers import suggest
+from armloop.convert.units import canonical
 from armloop.data.log import MotionLog, read_log
 from armloop.util.errors import InputError
 
@@ -135,3 +136,46 @@ def test_torques_in_parts_of_a_newton_metre_are_read(tmp_path, log, said, factor
     path.write_text("\n".join([",".join(names), *(",".join(f"{x:.12g}" for x in row) for row in cells)]))
     found = convert([path]).log
     np.testing.assert_allclose(found.tau, log.tau, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("names", "per_unit"),
+    [
+        (["Istposition{} [Grad]", "Geschwindigkeit{} [Grad/s]"], DEGREE),
+        (["Winkel{} (°)", "Drehzahl{} (U/min)"], [DEGREE, np.pi / 30]),
+        (["Posizione{} [gradi]", "Velocità{} [gradi/sec]"], DEGREE),
+        (["Положение{} [град]", "Скорость{} [рад/s]"], [DEGREE, 1.0]),
+    ],
+)
+def test_units_are_read_as_other_languages_spell_them(tmp_path, log, names, per_unit):
+    each = [stem.format(j) for stem in (*names, "Moment{} [Nmm]") for j in (1, 2, 3)]
+    of_q, of_v = np.broadcast_to(per_unit, 2)
+    cells = np.column_stack([1e3 * log.time, log.q / of_q, log.v / of_v, 1e3 * log.tau])
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "\n".join([",".join(["Zeit [ms]", *each]), *(",".join(f"{x:.12g}" for x in row) for row in cells)])
+    )
+    found = suggest(["Zeit [ms]", *each])
+    assert found.mapping is not None and not [field for field in found.unsure if field.endswith("unit")]
+    assert_same(convert([path]).log, log)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "written", "unit"),
+    [
+        ("vdot", "Grad/s²", "deg/s^2"),
+        ("vdot", "mm/s²", "mm/s^2"),
+        ("vdot", "°/s^2", "deg/s^2"),
+        ("vdot", "rad/s**2", "rad/s^2"),
+        ("vdot", "m/s2", "m/s^2"),
+        ("vdot", "rad/s", None),
+        ("vdot", "rev/s^2", None),  # no factor is known of it
+        ("v", "U/s", "rev/s"),
+        ("v", "rad/s^2", None),
+        ("time", "Sek", "s"),
+        ("tau", "Prozent", "%"),
+        ("q", "/s", None),
+    ],
+)
+def test_a_unit_by_its_spelling(quantity, written, unit):
+    assert canonical(written, quantity) == unit

@@ -19,28 +19,27 @@ FACTORS: dict[str, dict[str, float]] = {
 CURRENTS = ("A", "mA")
 #: By unit, how others spell it, lower case.
 _SPELT = {
-    "s": "sec, secs, second, seconds, 秒",
-    "ms": "msec, millisec, milliseconds, 毫秒",
-    "us": "usec, µs, microseconds",
+    "s": "sec, secs, second, seconds, sek, sekunde, sekunden, 秒",
+    "ms": "msec, millisec, milliseconds, millisekunden, 毫秒",
+    "us": "usec, µs, \u03bcs, microseconds, mikrosekunden",
     "ns": "nsec, nanoseconds",
-    "rad": "radian, radians, 弧度",
-    "deg": "degree, degrees, °, grados, 度",
+    "rad": "radian, radians, radiant, radianes, radianti, рад, 弧度",
+    "deg": "degree, degrees, °, grad, grados, gradi, graus, degrés, град, 度",
     "deg/s": "°/s, degs",
     "rad/s": "rads",
-    "rad/s^2": "rad/s2, rad/s², rad/s**2",
-    "deg/s^2": "deg/s2, deg/s²",
-    "m/s^2": "m/s2, m/s²",
-    "N*m": "nm, n*m, n·m, n.m, n m, n-m, 牛米",
+    "N*m": "nm, n*m, n·m, n.m, n m, n-m, newtonmeter, н·м, нм, 牛米",
     "N": "newton, n",
     "mN*m": "mnm, mn*m, mn·m, nmm, n*mm, n·mm, n.mm, n mm, n-mm",
     "cN*m": "cnm, cn*m, cn·m, ncm, n*cm, n·cm, n.cm, n cm, n-cm",
     "kN*m": "knm, kn*m, kn·m, kn.m",
     "A": "a, amp, amps, ampere, 安, 安培",
     "mA": "ma",
-    "%": "percent",
-    "rpm": "u/min, 1/min, r/min, rev/min",
+    "%": "percent, prozent",
+    "rpm": "u/min, 1/min, r/min, rev/min, umdr/min, upm, min-1, min^-1, об/мин",
+    "rev/s": "u/s, umdr/s, r/s",
 }
 _ALIASES = {word: unit for unit, words in _SPELT.items() for word in words.split(", ")}
+_SQUARED = ("^2", "**2", "²", "2")
 #: The unit of the velocity that goes with a position's, and so on.
 RATES = {"rad": "rad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "mm": "mm/s"}
 
@@ -59,11 +58,14 @@ def canonical(text: str, quantity: str) -> str | None:
     alias = spelt(text)
     if alias in known:
         return alias
-    if quantity == "v" and "/" in text:
-        of, _, per = text.partition("/")
-        rate = RATES.get(canonical(of, "q") or "")
+    of, _, per = text.partition("/")
+    rate = RATES.get(canonical(of, "q") or "") if quantity in ("v", "vdot") and per else None
+    if rate is None:
+        return None
+    if quantity == "v":
         return rate if canonical(per, "time") == "s" else None
-    return None
+    square = next((per.removesuffix(end) for end in _SQUARED if per.endswith(end)), "")
+    return f"{rate}^2" if f"{rate}^2" in known and canonical(square, "time") == "s" else None
 
 
 def time_unit(ratio: float) -> str | None:
