@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from armloop.model import AddedEffect, ReconstructedModel, load_model
 from armloop.model.components import RigidBody, SparseTerms
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters
-from armloop.util.errors import ArmError, InputError, ModelError
+from armloop.util.errors import ArmError, InputError, InputWarning, ModelError
 
 Data = dict
 
@@ -274,6 +275,19 @@ def test_a_model_of_another_arm_is_refused(saved: Path) -> None:
         ArmError, match=r"made for three_axis \(\w{16}\), but three_axis has other kinematics"
     ):
         load_model(saved, type(three_axis()).from_dict(longer))
+
+
+def test_a_model_of_an_arm_that_moves_alike_but_weighs_otherwise_is_warned_of(saved: Path) -> None:
+    arm = three_axis()
+    heavy = replace(arm, name="renamed", mass=arm.mass * [1.0, 1.5, 1.0])
+    with pytest.warns(InputWarning, match=r"made with, [\d.]+ kg in that of renamed") as told:
+        load_model(saved, heavy)
+    assert len(told) == 1 and f"joint {arm.joints[1].name} weighs {arm.mass[1]:.4g} kg" in str(
+        told[0].message
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load_model(saved, replace(arm, name="renamed", mass=arm.mass * (1 + 1e-9)))
 
 
 class Bomb:

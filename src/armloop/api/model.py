@@ -158,7 +158,8 @@ def load_model(path: str | Path, arm: Arm | str | Path | None = None) -> Model:
     """Read a model file.
 
     Args:
-        arm: refuse the model unless it was made for this one.
+        arm: refuse the model unless it was made for an arm of this one's joints and kinematics; that links weigh otherwise
+            is said as a warning.
 
     Raises:
         ModelError: the file is no model; ``ArmError``: it is that of another arm.

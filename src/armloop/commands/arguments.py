@@ -9,7 +9,10 @@ from armloop.commands.options import Check, Options, argument, flag, option, sev
 _LOG_HELP = "motion logs, CSV or Parquet: time,q1..qn,v1..vn,tau1..taun (SI units; joints base to tip)"
 ARM_HELP = "a built-in arm (three_axis, scara) or the path of a URDF"
 
-REFUSE_OTHERS = "refuse the model unless it was made for this arm"
+REFUSE_OTHERS = (
+    "refuse the model unless it was made for an arm of the same joints and kinematics; the name does not count, and other "
+    "masses are warned of"
+)
 
 METHOD: str = option(
     "stepwise, or sindy: one regression of everything, the reference method (%(default)s)", "stepwise"

@@ -27,6 +27,7 @@ from armloop.model.components import COMPONENTS, Component, RigidBody
 from armloop.model.pointwise import InverseDynamics, Parts, pointwise, stacked
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
+from armloop.robot.plausibility import require_made_for
 from armloop.util.arrays import Array
 from armloop.util.errors import ArmError, InputError, ModelError
 from armloop.util.files import write_json
@@ -370,15 +371,14 @@ def _of_joints(x: Array, n: int, what: str) -> Array:
 
 
 def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:
-    """Read a model file; with ``arm``, refuse a model that was made for another one.
+    """Read a model file; with ``arm``, refuse a model made for one that moves otherwise.
 
     Raises:
-        ModelError: unreadable, not JSON, another schema, or a field missing, misshapen or not finite.
-        ArmError: the model belongs to another arm.
+        ModelError: unreadable, no JSON, another schema, or a bad field; ``ArmError``: the model is of another arm.
     """
     model = model_of(read_json(path, ModelError, "a model written by `armloop reconstruct`"), str(path))
     if arm is not None:
-        model.arm.require_same(arm, str(path))
+        require_made_for(model.arm, arm, str(path))
     return model
 
 

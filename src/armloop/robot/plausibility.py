@@ -1,4 +1,4 @@
-"""Range checks of a log against an arm's limits: another unit, another order of the joints, or another arm."""
+"""Range checks of a log against an arm's limits, and of a model's arm against a URDF: another unit, order or arm."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from armloop.util.doubts import warn
 _BEYOND = 0.25
 #: So many times the effort limit may be measured: limits that last are lower than what a drive gives for a moment.
 _TIMES = 10.0
+#: Masses that differ by less than this part of them are one, written with other digits.
+_SAME_MASS = 1e-6
 
 
 def say_beyond_limits(arm: Arm, logs: Sequence[MotionLog]) -> None:
@@ -38,3 +40,19 @@ def beyond_limits(arm: Arm, log: MotionLog) -> Iterator[str]:
                 f"column tau{j + 1} reaches {most:.3g} {joint.torque_unit}, {most / joint.effort:.3g} times the effort "
                 f"limit of {joint.name}; check its unit"
             )
+
+
+def require_made_for(made_for: Arm, arm: Arm, what: str) -> None:
+    """Raise ``ArmError`` unless a model's arm moves like another; say where links weigh otherwise, which it may be despite.
+
+    Args:
+        what: the model, such as its path.
+    """
+    made_for.require_same(arm, what)
+    for joint, mine, other in zip(arm.joints, made_for.mass, arm.mass, strict=True):
+        if abs(other - mine) > _SAME_MASS * max(mine, other):
+            warn(
+                f"{what}: the link behind joint {joint.name} weighs {mine:.4g} kg in the URDF of {made_for.name} that the "
+                f"model was made with, {other:.4g} kg in that of {arm.name}; the model goes by its own"
+            )
+            return
