@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+import armloop as al
 from armloop.cli import main
 from armloop.schemas.checking import checked
 from armloop.schemas.published import FILES
@@ -77,3 +78,14 @@ def test_a_home_that_cannot_be_written_to_is_nobodys_trouble(
     assert main(["cluster", "good.csv", "--json"]) == 0
     assert not caplog.records
     assert logging.getLogger("matplotlib").isEnabledFor(logging.WARNING)
+
+
+def test_evaluate_and_its_page_say_why_a_diagnosis_states_other_errors(
+    inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(inputs)
+    said = "A diagnosis does not judge those near the start and the end of a run"
+    assert main(["evaluate", "model.json", "good.csv"]) == 0
+    assert said in " ".join(capsys.readouterr().out.split())
+    page = al.load_model("model.json").score(al.read_log("good.csv")).report(tmp_path / "score.html")
+    assert said in page.read_text(encoding="utf-8")

@@ -120,6 +120,9 @@ class Comparison:
 def evaluate(model: ReconstructedModel, logs: MotionLog | Sequence[MotionLog]) -> Score:
     """Compare a model's prediction with logs: RMSE and nRMSE per joint, standstill apart.
 
+    Every sample of a joint that moves counts; of these :func:`armloop.diagnose` does not judge those near the start and end
+    of a run, within an event, far outside the trained range or slower than in training.
+
     Raises:
         InputError: a log does not fit the model's arm or its unit of torque.
     """

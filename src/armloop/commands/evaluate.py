@@ -20,7 +20,8 @@ def run(options: Evaluate) -> None:
     from armloop.data.repeats import require_different
     from armloop.data.signals import preprocess
     from armloop.identification.scoring import score
-    from armloop.reports.tables import score_table
+    from armloop.reports.tables import ALL_COUNT, score_table
+    from armloop.reports.words import wrapped
     from armloop.robot.plausibility import say_beyond_limits
     from armloop.util.doubts import warn
     from armloop.util.errors import InputError
@@ -42,4 +43,4 @@ def run(options: Evaluate) -> None:
     if options.json:
         print_json(result.to_dict())
         return
-    print(score_table(result, model.arm, units=model.torque_units))
+    print(score_table(result, model.arm, units=model.torque_units), wrapped(ALL_COUNT), sep="\n")

@@ -106,7 +106,7 @@ def errors_table(diagnosis: Diagnosis) -> Table:
         for j, joint in enumerate(diagnosis.model.arm.joints)
     ]
     headers = ["joint", "unit", "before", "after", "baseline", "nRMSE before", "nRMSE after"]
-    return make_table(headers, rows, "Residual on data not fitted, RMSE", left=(0, 1))
+    return make_table(headers, rows, "Residual on data judged but not fitted, RMSE", left=(0, 1))
 
 
 def feedforward_table(diagnosis: Diagnosis, compensation: Closing) -> Table:

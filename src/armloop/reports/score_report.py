@@ -10,7 +10,7 @@ from armloop.identification.scoring import Score
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots.style import BLUE, annotate, figure, panels, polish
 from armloop.reports.prose import Prose
-from armloop.reports.tables import mean_nrmse, score_table
+from armloop.reports.tables import ALL_COUNT, mean_nrmse, score_table
 from armloop.reports.words import percent
 from armloop.robot.arm import Arm
 
@@ -31,7 +31,7 @@ def score_figure(score: Score, arm: Arm) -> Figure:
 
 def score_report(score: Score, arm: Arm, units: Sequence[str] = ()) -> str:
     """One HTML page on a score, in units, if they are not those of torques."""
-    say = Prose("score", score=score)
+    say = Prose("score", score=score, what_counts=ALL_COUNT)
     picture = Picture(score_figure(score, arm), say["errors"])
     section = Section(
         "Prediction error", say.paragraphs("text"), [picture], [score_table(score, arm, units=units)]

@@ -243,6 +243,13 @@ def score_table(
     return make_table(headers, rows, title, left=(0, 1))
 
 
+#: What :func:`score_table` counts of a log, beside what a diagnosis judges of the same.
+ALL_COUNT = (
+    "Every sample of a joint that moves counts here. A diagnosis does not judge those near the start and the end of a run, "
+    "within an event, far outside the trained range or slower than in training, so its errors of the same log are others."
+)
+
+
 def mean_nrmse(score: Score) -> float:
     """Mean over the joints of the nRMSE of moving samples; NaN if no joint moves."""
     values = [x for x in score.moving["nrmse"] if x is not None]
