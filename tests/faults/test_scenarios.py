@@ -42,9 +42,9 @@ SCENARIOS: dict[str, tuple[str, str]] = {
         "plant: three_axis\nreference: {kind: fourier, duration: 5.0}\nscore: [1.0, 1.005]\ncontrollers: [pid]\n",
         r"score is \[1.0, 1.005\]; it must be a start and an end in 0 to 5 s, 0.01 s or more apart",
     ),
-    "no score of a short motion": (
-        "plant: three_axis\nreference: {kind: fourier, duration: 5.0}\ncontrollers: [pid]\n",
-        r"score is \[20.0, 40.0\], as where none is stated; it must be",
+    "a faulty effect of a short motion": (
+        "plant: three_axis\nreference: {kind: fourier, duration: 5.0}\neffects: [{effect: gremlin, joint: 2}]\n",
+        "effects: .*gremlin",
     ),
     "an infinite gain": ("plant: three_axis\nkp: [.inf]\n", "finite number"),
     "a gain of 1e999": ("plant: three_axis\nkp: [1e999]\n", "finite number"),

@@ -154,7 +154,7 @@ class TrackingData(Struct, forbid_unknown_fields=True):
     ki: Numbers = field(default_factory=lambda: [8.0])  # N*m/(rad s)
     kd: Numbers = field(default_factory=lambda: [2.0])  # N*m*s/rad
     reference: ReferenceData = field(default_factory=ReferenceData)
-    score: Numbers = field(default_factory=lambda: [20.0, 40.0])  # s, start and end; []: the whole run
+    score: Numbers | None = None  # s, start and end; []: the whole run; its second half when absent
     controllers: Annotated[list[Name], Meta(max_length=100)] = field(default_factory=lambda: list(PAPER))
     # rad/s, of computed torque, whose errors decay critically damped; by default each joint's is such that it is as stiff
 

@@ -67,6 +67,12 @@ def test_built_in_tracking():
     assert scenario.plant.name == "three_axis"
 
 
+@pytest.mark.parametrize(("duration", "score"), [(40.0, (20.0, 40.0)), (8.0, (4.0, 8.0))])
+def test_the_second_half_of_a_run_is_scored_where_no_interval_is_stated(tmp_path, duration, score):
+    scenario = load(tmp_path, f"plant: three_axis\nreference: {{kind: fourier, duration: {duration}}}\n")
+    assert scenario.score == score
+
+
 def test_own_plant_and_urdf_beside_the_scenario(tmp_path):
     scenario = load(tmp_path, OWN + "kd: [2.0, 3.0, 2.5]\nscore: [0.0, 20.0]\n")
     assert scenario.plant.config.friction[0].static == 1.0

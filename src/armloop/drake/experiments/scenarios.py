@@ -181,12 +181,12 @@ def load_tracking(
         raise ScenarioError(f"{where}: pickup and wear are two kinds of run; give one of them")
     if data.pickup and data.controllers not in (["pid_step3"], TrackingData().controllers):
         raise ScenarioError(f"{where}: controllers: a pickup is run by pid_step3 alone; leave them out")
-    score = data.score or [0.0, reference.duration]
+    default = [reference.duration / 2, reference.duration]
+    score = default if data.score is None else data.score or [0.0, reference.duration]
     least = _FEWEST_STEPS * period
     if len(score) != 2 or not 0 <= score[0] <= score[1] - least < score[1] <= reference.duration + 1e-9:
-        unstated = ", as where none is stated" if data.score == TrackingData().score else ""
         raise ScenarioError(
-            f"{where}: score is {score}{unstated}; it must be a start and an end in 0 to {reference.duration:g} s, "
+            f"{where}: score is {score}; it must be a start and an end in 0 to {reference.duration:g} s, "
             f"{least:g} s or more apart"
         )
     if data.bandwidth is not None and not 0 < data.bandwidth <= 1 / period:
