@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -191,8 +192,24 @@ def test_the_unit_of_a_law_found_is_that_of_its_torque_by_its_function(
 RUBBING = {n for n, kind in EFFECTS.items() if kind.rubs and not (kind.of_time or kind.needs_model)}
 
 
+#: What rubs harder one way: half of the difference, which acts either way with one sign.
+UNEVEN = ("friction_asymmetry", "viscous_asymmetry")
+#: A speed so small that nothing has changed by then but the direction, rad/s.
+BARELY = 1e-9
+
+
+def rests_and_turns(at: Callable[[float], float]) -> bool:
+    """Whether the part of a torque of speed that turns with the direction is none at rest, and there is one in motion.
+
+    At rest acts what is alike either way: nothing of friction alone; of a law of the angle one way, half of that.
+    """
+    alike = (at(BARELY) + at(-BARELY)) / 2
+    turns = [at(v) - at(-v) for v in (1e-3, 0.5)]
+    return at(0.0) == pytest.approx(alike, rel=1e-6, abs=1e-8) and all(abs(x) > 1e-9 for x in turns)
+
+
 @pytest.mark.parametrize("name", sorted(RUBBING))
-def test_a_joint_at_rest_is_supplied_no_friction_and_either_way_as_much(name: str) -> None:
+def test_what_of_a_joint_turns_with_its_direction_is_not_supplied_at_rest(name: str) -> None:
     n = an_arm().n
     own = {p.name: 0.4 if p.default is None else p.default for p in EFFECTS[name].parameters}
     law = effect(name, 2).pointwise(an_arm(), own, None)
@@ -200,10 +217,30 @@ def test_a_joint_at_rest_is_supplied_no_friction_and_either_way_as_much(name: st
     def at(v: float) -> float:
         return float(law(np.full(n, 0.3), v * np.eye(n)[1], np.zeros(n))[1])
 
-    assert at(0.0) == 0.0
-    odd = 1.0 if name in ("friction_asymmetry", "viscous_asymmetry") else -1.0
-    for v in (1e-3, 0.5):
-        assert at(v) != 0.0 and at(-v) == pytest.approx(odd * at(v))
+    if name in UNEVEN:
+        assert at(0.0) == 0.0 and all(at(v) != 0.0 and at(-v) == pytest.approx(at(v)) for v in (1e-3, 0.5))
+    else:
+        assert rests_and_turns(at)
+
+
+@pytest.mark.parametrize(
+    ("at", "right"),
+    [
+        (np.sign, True),
+        (lambda v: np.sin(0.3) * (1 + np.sign(v)) / 2, True),  # a cam that acts one way alone
+        (lambda v: 1.0 if v >= 0 else -1.0, False),  # friction that acts at rest
+        (lambda v: np.sin(0.3) * (v >= 0), False),  # so does this one
+        (
+            lambda v: 0.5 * np.sign(v) + 0.2 * abs(np.sign(v)),
+            False,
+        ),  # more one way than the other, but none at rest
+        (lambda v: 0.3, False),  # of no direction
+    ],
+)
+def test_a_law_half_of_the_angle_and_half_of_the_direction_is_told_from_friction_at_rest(
+    at: Callable[[float], float], right: bool
+) -> None:
+    assert rests_and_turns(at) == right
 
 
 @pytest.mark.parametrize("link", [0, 2])
