@@ -266,7 +266,10 @@ def test_tracking_and_excitation_show_themselves(model, tmp_path):
     assert tracked.to_dict()["not_run"] == [] and "not run" not in str(tracked)
     half = al.track(tmp_path / "short.yaml", {"mine": model})
     assert half.to_dict()["not_run"] == ["pid_step3"]
-    assert "not run: pid_step3, for want of a model" in str(half)
+    assert "not run: pid_step3, for want of a model; one named as its controller (pid_step3) serves" in str(
+        half
+    )
+    assert al.track(tmp_path / "short.yaml", {"pid_step3": model}).to_dict()["not_run"] == []
     assert "<img" in tracked.report(tmp_path / "page.html").read_text()
     reference = al.excite("three_axis", library="rigid-body", duration=10, starts=1, random=4)
     assert reference.save(tmp_path / "ref.csv") > 1000 and reference.plot().axes

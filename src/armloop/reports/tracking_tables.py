@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armloop.reports.tables import Table, make_table, named_eta_table
-from armloop.reports.words import controller, number
+from armloop.reports.words import controller, number, wrapped
 
 if TYPE_CHECKING:
     from armloop.drake.experiments.tracking import TrackingResult
@@ -48,7 +48,14 @@ def spread_table(result: WearResult) -> Table:
 def not_run(answer: Mapping[str, Any]) -> list[str]:
     """A line on the controllers that had no model, of the content of ``tracking.json``; empty if all ran."""
     names = answer.get("not_run", [])
-    return [f"not run: {', '.join(names)}, for want of a model"] if names else []
+    if not names:
+        return []
+    return [
+        wrapped(
+            f"not run: {', '.join(names)}, for want of a model; one named as its controller ({names[0]}) serves that, one "
+            "named `model` all that have none of their own"
+        )
+    ]
 
 
 def metrics_table(results: Mapping[str, TrackingResult]) -> Table:
