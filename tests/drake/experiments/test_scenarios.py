@@ -17,7 +17,8 @@ from armloop.drake.experiments.scenarios import (
 )
 from armloop.drake.plant.config import Instruments, PlantConfig
 from armloop.experiment.excitation import fourier_reference, write_reference
-from armloop.schemas.scenarios import PlantData
+from armloop.robot.arm import load_arm
+from armloop.schemas.scenarios import FrictionData, PlantData, RangesData
 from armloop.util.errors import ScenarioError
 from armloop.util.resources import scenario_path, urdf_path
 
@@ -255,6 +256,20 @@ def test_what_a_file_leaves_out_is_as_in_python():
         assert getattr(given, name) == getattr(instruments, name)
     arm = load_plant("three_axis")
     assert given.time_step == PlantConfig(arm.config.friction, arm.config.ranges).time_step
+
+
+def test_the_page_has_every_field_of_an_own_plant_and_its_example_is_one(tmp_path, repository):
+    page = (repository / "docs" / "scenarios.md").read_text(encoding="utf-8")
+    section = page.partition("## A plant of your own")[2].partition("\n## ")[0]
+    for kind in (PlantData, FrictionData, RangesData):
+        for field in kind.__struct_fields__:
+            assert f"`{field}`" in section, field
+    example = section.partition("```yaml\n")[2].partition("```")[0]
+    (tmp_path / "mine.yaml").write_text(
+        f"{example}reference: {{kind: fourier, duration: 8.0}}\n", encoding="utf-8"
+    )
+    scenario = load_tracking(tmp_path / "mine.yaml", arm=load_arm("three_axis", tip="link_2"))
+    assert [f.stribeck_velocity for f in scenario.plant.config.friction] == [0.1, 0.1]
 
 
 @pytest.mark.parametrize("key", ["static_settle", "velocity_settle"])
