@@ -1,4 +1,7 @@
-"""One account of a run: the events in it, the effects found beside them, and what no listed effect explains."""
+"""Joint hypothesis on a run, an account of it: its events, the effects found beside them, what no listed effect explains.
+
+Accounts of one run are compared by what each leaves on held-out data, and by their posterior odds.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ _AHEAD = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Account:
-    """What happened in a run.
+    """Joint hypothesis on a run: all that happened in it.
 
     Attributes:
         whole: the run; joints rest as long as their rest is recorded, where that is late.

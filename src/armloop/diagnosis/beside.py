@@ -1,4 +1,4 @@
-"""Accounts of a run beside effects that are given, with the times at which they are there: all else is searched anew.
+"""Conditional search: the account of a run given some effects, with the times at which they are there; all else is anew.
 
 What comes and goes within a run is no hypothesis of the search, for when it does is found first. The search is made by a
 model that has the effects, and then all are fitted together.
