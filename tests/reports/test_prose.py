@@ -41,7 +41,7 @@ def test_conditions_decide_how_many_paragraphs_there_are() -> None:
 
 
 def test_a_large_number_keeps_its_narrow_blanks() -> None:
-    said = Prose("score", score=SimpleNamespace(samples=12345))["text"]
+    said = Prose("score", score=SimpleNamespace(samples=12345), what_counts="")["text"]
     assert "of 12\u202f345 samples, conditioned" in said
 
 
