@@ -245,8 +245,8 @@ def score_table(
 
 #: What :func:`score_table` counts of a log, beside what a diagnosis judges of the same.
 ALL_COUNT = (
-    "Every sample of a joint that moves counts here. A diagnosis does not judge those near the start and the end of a run, "
-    "within an event, far outside the trained range or slower than in training, so its errors of the same log are others."
+    "Every sample of a joint that moves counts. A diagnosis, which leaves out a run's ends, events, and what lies far "
+    "outside the trained range, has other errors of the same log."
 )
 
 
