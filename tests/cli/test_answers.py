@@ -84,7 +84,7 @@ def test_evaluate_and_its_page_say_why_a_diagnosis_states_other_errors(
     inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(inputs)
-    said = "A diagnosis, which leaves out a run's ends, events"
+    said = "A diagnosis, which leaves out the ends of a run, events"
     assert main(["evaluate", "model.json", "good.csv"]) == 0
     assert said in " ".join(capsys.readouterr().out.split())
     page = al.load_model("model.json").score(al.read_log("good.csv")).report(tmp_path / "score.html")

@@ -245,7 +245,7 @@ def score_table(
 
 #: What :func:`score_table` counts of a log, beside what a diagnosis judges of the same.
 ALL_COUNT = (
-    "Every sample of a joint that moves counts. A diagnosis, which leaves out a run's ends, events, and what lies far "
+    "Every sample of a joint that moves counts. A diagnosis, which leaves out the ends of a run, events, and what lies far "
     "outside the trained range, has other errors of the same log."
 )
 
