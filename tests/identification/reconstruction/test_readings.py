@@ -303,6 +303,14 @@ def chosen(plain: Fit, others: dict[str, Fit], monkeypatch: pytest.MonkeyPatch) 
         # an order must be three times as good in the geometric mean; a unit by half
         (fit_of([0.3, 0.2]), {"order": fit_of([0.1, 0.066])}, "joints 1 and 2 are exchanged"),
         (fit_of([0.3, 0.2]), {"order": fit_of([0.1, 0.067])}, ""),
+        # of two joints of several these must be twice as good, none worse by more than a fifth, and better than with springs
+        (fit_of([0.03, 0.3, 0.1]), {"order": fit_of([0.03, 0.14, 0.05])}, "joints 2 and 3 are exchanged"),
+        (fit_of([0.03, 0.3, 0.1]), {"order": fit_of([0.03, 0.16, 0.05])}, ""),
+        (fit_of([0.03, 0.3, 0.1]), {"order": fit_of([0.037, 0.12, 0.04])}, "joints 2 and 3 are exchanged"),
+        (fit_of([0.03, 0.3, 0.1]), {"order": fit_of([0.038, 0.12, 0.04])}, ""),
+        (fit_of([0.03, 0.3, 0.03]), {"order": fit_of([0.03, 0.14, 0.01])}, ""),
+        (fit_of([0.03, 0.3, 0.1]), {"order": fit_of([0.03, 0.14, 0.05]), "springs": fit_of([0.03, 0.15, 0.05])}, "joints 2"),
+        (fit_of([0.03, 0.3, 0.1]), {"order": fit_of([0.03, 0.14, 0.05]), "springs": fit_of([0.03, 0.13, 0.05])}, ""),
         (fit_of([0.3, 0.2]), {"turns": fit_of([0.2, 0.13])}, "revolutions: read so all torques are explained 1.5 times"),
         (fit_of([0.3, 0.2]), {"degrees": fit_of([0.2, 0.134])}, ""),
         # a direction: the best joint twice, all by a fifth, none worse by more than a fifth

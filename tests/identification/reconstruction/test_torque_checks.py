@@ -118,8 +118,7 @@ class TestWhole:
 
         class Given:
             def fit(self, signs: Any, order: Any) -> str:
-                assert signs.tolist() == [1.0] * 3 and order.tolist() == [0, 1, 2]
-                return "plain"
+                return "plain" if signs.tolist() == [1.0] * 3 and order.tolist() == [0, 1, 2] else "mended"
 
             def turned(self, plain: str) -> Any:
                 return asked["turned"]
@@ -138,7 +137,9 @@ class TestWhole:
         monkeypatch.setattr(torque_checks, "Problem", Given)
         monkeypatch.setattr(torque_checks, "placed_runs", lambda logs: list(enumerate(logs)))
         monkeypatch.setattr(torque_checks, "is_time_series", lambda q, runs: q)
-        monkeypatch.setattr(torque_checks, "meant", lambda *_: (asked.get("meant", ""), None))
+        monkeypatch.setattr(
+            torque_checks, "meant", lambda *given: (asked.get("meant", {}).get(given[3], ""), None)
+        )
         monkeypatch.setattr(torque_checks, "together", lambda *_: [])
         monkeypatch.setattr(torque_checks, "times_lighter", lambda *_: asked.get("lighter", 0.0))
         return asked
@@ -176,11 +177,24 @@ class TestWhole:
         asked["exchanged"] = [(0, 2)]
         assert "columns tau1 and tau3 are exchanged" in self.check("a")
 
+    @pytest.mark.parametrize(("fault", "found"), [("scaled", (1, 0.1)), ("exchanged", (0, 2))])
+    def test_a_record_read_wrongly_is_named_before_a_column_that_looks_like_it(
+        self, fault: str, found: tuple[Any, ...], asked: dict[str, Any]
+    ) -> None:
+        asked[fault] = [found]
+        asked["meant"] = {"plain": "it lies"}
+        assert "tau" in self.check("a")
+        asked["meant"] = {"plain": "it lies", "mended": "it lies"}
+        assert self.check("a") == "a: it lies"
+        # one that explains far more than the column put right, but no more than the record as it stands
+        asked["meant"] = {"mended": "it lies"}
+        assert "tau" in self.check("a")
+
     def test_an_arm_that_lies_may_hang_from_drives_that_carry_it(self, asked: dict[str, Any]) -> None:
         asked["lighter"] = 3.14
         with pytest.warns(InputWarning, match=r"a: the torques hold no weight: .* 3\.1 times as well"):
             assert self.check("a") == ""
-        asked["meant"] = "it lies"
+        asked["meant"] = {"plain": "it lies"}
         assert self.check("a").startswith("a: it lies; or the torques hold no weight: without gravity")
 
 

@@ -11,7 +11,7 @@ of the URDF, which may be dummies.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -70,26 +70,43 @@ def check_torques(
             f"{names}: the sign of {which} is turned: as recorded, friction drives and inertia is negative; "
             "torque must be what the drive does on the joint in the direction of q"
         )
-    for i, j in problem.better_exchanged(plain):
-        raise LogError(
-            f"{names}: columns tau{i + 1} and tau{j + 1} are exchanged: the other way round they are explained "
-            "at least twice as well; put the columns in the order of the joints, base to tip"
-        )
-    for j, factor in problem.better_scaled(plain):
-        raise LogError(
-            f"{names}: the torques do not fit one another: tau{j + 1} is about {float(f'{1 / factor:.2g}'):g} times what "
-            "the links give that explain the other joints; check the units and drive gains of all joints"
-        )
+    faults = list(_one_fault(problem, plain, arm.n))
+    for fault, left in faults:
+        # a whole record that is read wrongly may look like it, too, but then that explains far more
+        if not meant(problem, chosen, cutoff_hz, left)[0]:
+            raise LogError(f"{names}: {fault}")
     wrong, found = _otherwise(problem, chosen, cutoff_hz, plain)
     times = times_lighter(problem, plain)
     if wrong:
         raise LogError(f"{names}: {wrong}{f'; or {lighter(times)}' if times else ''}")
+    for fault, _ in faults:
+        raise LogError(f"{names}: {fault}")
     if times:
         warn(
             f"{names}: {lighter(times)}: energies of the library lagrangian can be of that alone, a rigid body has weight "
             "(add tau_g(q) to tau for one)"
         )
     return found if blind is not None else []
+
+
+def _one_fault(problem: Problem, plain: Fit, n: int) -> Iterator[tuple[str, Fit]]:
+    """What is wrong with single columns of the torques, and what is left of the record where that is put right."""
+    for i, j in problem.better_exchanged(plain):
+        order = np.arange(n)
+        order[[i, j]] = order[[j, i]]
+        fault = (
+            f"columns tau{i + 1} and tau{j + 1} are exchanged: the other way round they are explained "
+            "at least twice as well; put the columns in the order of the joints, base to tip"
+        )
+        yield fault, problem.fit(np.ones(n), order)
+    for j, factor in problem.better_scaled(plain):
+        factors = np.ones(n)
+        factors[j] = factor
+        fault = (
+            f"the torques do not fit one another: tau{j + 1} is about {float(f'{1 / factor:.2g}'):g} times what "
+            "the links give that explain the other joints; check the units and drive gains of all joints"
+        )
+        yield fault, problem.fit(factors, np.arange(n))
 
 
 def _otherwise(
