@@ -276,5 +276,8 @@ def test_what_is_left_free_is_said_with_the_inertias_that_are_negative() -> None
     ] * 3 + [True]
     (plain,) = physics_notes({"kept_positive": physical.FREE})
     assert plain.endswith("M(q) was left free")
+    # no cause is known to be the one
+    for cause in ("another unit or gain", "weight alone", "sensors that lag", "unlike the URDF's"):
+        assert cause in plain
     (note,) = physics_notes({"kept_positive": physical.FREE, "negative": {"Izz3": -1.0, "m2": -2.0}})
     assert note == plain + "; negative, as for no arm: Izz3, m2"

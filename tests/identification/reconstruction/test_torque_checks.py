@@ -142,6 +142,7 @@ class TestWhole:
         )
         monkeypatch.setattr(torque_checks, "together", lambda *_: [])
         monkeypatch.setattr(torque_checks, "times_lighter", lambda *_: asked.get("lighter", 0.0))
+        monkeypatch.setattr(torque_checks, "weight_alone", lambda *_: False)
         return asked
 
     @staticmethod

@@ -54,6 +54,18 @@ def test_of_weight_that_is_there_or_that_springs_carry_nothing_is_said(log: Moti
     assert not told(log)
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_torques_that_hold_the_weight_alone_are_said_to_be(seed: int) -> None:
+    """A hand leads the arm; inertia, of joints with or without friction, is felt by drives that move it."""
+    motion, arm = fourier_motion(30.0, 100.0, seed), three_axis()
+    weight = rigid_torque(arm, motion.q, 0 * motion.v, 0 * motion.vdot)
+    (line,) = told(measured(motion, weight, seed))
+    assert "the torques hold weight, and neither inertia nor friction explain any more of them" in line
+    moved = rigid_torque(arm, motion.q, motion.v, motion.vdot)
+    for dry in (0.0, 0.1):
+        assert not told(measured(motion, moved + dry * friction(motion.v), seed))
+
+
 @dataclass
 class Arm:
     """Two joints."""

@@ -33,6 +33,11 @@ _ALIKE = 0.05
 _CLEAR, _SLACK = 1e-3, 1e-9
 #: Costs of a constraint that occur by chance in so many of all cases say nothing against it.
 CHANCE = 0.999
+#: What makes data contradict it.
+_WHY = (
+    "tau of another unit or gain at each joint, as currents or parts of a rating? tau that holds weight alone? sensors that "
+    "lag? an arm unlike the URDF's?"
+)
 #: Where M(q) was kept positive definite: at every posture, for its links are bodies; over the joint limits; at the
 #: postures of the motion alone; nowhere, for the data contradict it; nowhere, for no such coefficients were found.
 EVERYWHERE, LIMITS, TRAINED, FREE, UNKNOWN = "everywhere", "limits", "trained", "free", "unknown"
@@ -271,7 +276,7 @@ def physics_notes(history: dict[str, Any]) -> list[str]:
     """What the user should know of constraints, in a line."""
     where = history.get("kept_positive")
     if where == FREE:
-        free = "the data contradict a positive definite M(q) by more than noise (sensors that lag?): M(q) was left free"
+        free = f"the data contradict a positive definite M(q) by more than noise ({_WHY}): M(q) was left free"
         below = ", ".join(history.get("negative", {}))
         return [free + (f"; negative, as for no arm: {below}" if below else "")]
     if where == UNKNOWN:

@@ -140,6 +140,14 @@ class PlainFits:
         columns = np.concatenate([full[:, :, base.kept], table.columns[:, :, self.base.count :]], axis=2)
         return replace(self, arm=arm, base=base, table=replace(table, columns=columns))
 
+    def of_weight_alone(self) -> Self:
+        """The same record as that of links at rest on joints without friction."""
+        motion, table, r = self.table.motion, self.table, self.base.count
+        still = replace(motion, v=np.zeros_like(motion.v), vdot=np.zeros_like(motion.vdot))
+        columns = np.zeros_like(table.columns)
+        columns[:, :, :r] = self.base.columns(self.arm, still)
+        return replace(self, table=replace(table, columns=columns))
+
     @cached_property
     def _by_gravity(self) -> list[Array]:
         """Columns (N, n, P) of the full parameters without gravity, and what 1 m/s² of it along each axis adds to them."""

@@ -25,7 +25,12 @@ from armloop.identification.reconstruction.readings import meant
 from armloop.identification.reconstruction.stances import Stance, as_it_stands
 from armloop.identification.reconstruction.stances_together import together
 from armloop.identification.reconstruction.systematic_sample import placed_runs
-from armloop.identification.reconstruction.weightless import lighter, times_lighter
+from armloop.identification.reconstruction.weightless import (
+    WEIGHT_ALONE,
+    lighter,
+    times_lighter,
+    weight_alone,
+)
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.doubts import warn
@@ -63,6 +68,10 @@ def check_torques(
     named = list(dict.fromkeys(log.name for log in chosen))
     names = ", ".join(named[:3]) + (", ..." if len(named) > 3 else "")
     plain = problem.fit(np.ones(arm.n), np.arange(arm.n))
+    if weight_alone(problem, plain):
+        # of joints that carry none there is nothing but noise, which any other sign, order or unit explains as well
+        warn(f"{names}: {WEIGHT_ALONE}")
+        return []
     turned = problem.turned(plain)
     if turned:
         which = "all joints" if len(turned) == arm.n else ", ".join(f"tau{j + 1}" for j in turned)
