@@ -317,6 +317,9 @@ def test_doubts_are_said_after_the_work_and_in_json(
     out, err = capsys.readouterr()
     (warning,) = json.loads(out)["warnings"]
     assert "20 samples a second" in warning and str(tmp_path / "slow.csv") in warning
+    # no more is asked for than what nothing is said of
+    assert "need 50 or more, better 100" in warning
+    assert good(seconds=60.0, rate=50.0).doubts() == []
     assert err == f"armloop: warning: {warning}\n"
 
 

@@ -38,8 +38,8 @@ _SPIKE_LEAST = {"q": 0.1, "v": 1.0, "vdot": 100.0, "tau": 1.0}
 _JUMP, _UNUSUAL = 0.1, 30.0
 # A joint that moves goes so far, rad or m.
 _MOVES = 1e-2
-# Samples a second that hardly any recorder takes.
-_HARDLY = 5000.0
+# Samples a second that tell of accelerations and reversals, and that hardly any recorder takes.
+_ENOUGH, _HARDLY = 50.0, 5000.0
 # Rows that tell whether a log is a time series.
 _SERIES_ROWS = 20_000
 
@@ -79,10 +79,10 @@ def doubts(log: Recorded) -> Iterator[Finding]:
     else:
         yield from disagreements(mended(log))
     rate = sample_rate(log.time)
-    if rate < 50.0:
+    if rate < _ENOUGH:
         yield Finding(
             "column time",
-            f"has {rate:.3g} samples a second; accelerations and reversals of friction need 100 or more",
+            f"has {rate:.3g} samples a second; accelerations and reversals of friction need {_ENOUGH:g} or more, better 100",
         )
     elif rate > _HARDLY:
         yield Finding(
