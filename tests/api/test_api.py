@@ -20,7 +20,7 @@ from armloop.data.motion import Motion
 from armloop.experiment.design import Settings
 from armloop.identification.reconstruction import Options as ReconstructionOptions
 from armloop.regression.sparse import Sparse
-from armloop.util.errors import InputError, LogError
+from armloop.util.errors import InputError, InputWarning, LogError
 
 PUBLIC = (
     "MotionLog", "diagnose", "evaluate", "excite", "load_arm", "load_model", "read_log", "read_logs", "reconstruct", "track",
@@ -184,6 +184,15 @@ def test_a_score_and_a_log_show_themselves(model, tmp_path):
     assert score.plot().axes and "<img" in score._repr_html_()
     assert "Prediction error" in score.report(tmp_path / "score.html").read_text()
     assert str(log).count("\n") == 4 and "<pre>" in log._repr_html_()
+
+
+def test_a_joint_that_never_moves_is_said(model):
+    log = run(5, 6)
+    dead = MotionLog(log.time, log.q * [1, 1, 0], log.v * [1, 1, 0], log.tau, name="run")
+    with pytest.warns(
+        InputWarning, match=r"run: column q3 is 0 in every row: if \w+ moved, its encoder is dead"
+    ):
+        al.evaluate(model, dead)
 
 
 def test_currents_and_torques_do_not_mix(model):

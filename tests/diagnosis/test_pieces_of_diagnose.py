@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from synthetic import three_axis
 from told_answers import CONTACT, Answers, Evidence, judged, module
 
+from armloop.data.log import unchecked_log
 from armloop.diagnosis.diagnose import diagnose
 from armloop.diagnosis.suspected import Suspected
 from armloop.diagnosis.unlisted import Unlisted
@@ -16,7 +18,7 @@ from armloop.diagnosis.verdict import Diagnosis
 from armloop.laws.effects import effect
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.errors import InputError
+from armloop.util.errors import InputError, InputWarning
 from armloop.util.finite import finite
 
 
@@ -329,3 +331,17 @@ def test_what_is_left_is_judged_where_joints_slide_and_what_is_found_at_reversal
     assert answers.asked["judged"] is answers.account.rows and made.sliding is answers.account.rows
     ((among, left, counted),) = asked
     assert among == ["drag"] and left == (1,) and counted.tolist() == answers.account.rows.ravel().tolist()
+
+
+def test_a_joint_that_never_moves_is_said_before_the_work() -> None:
+    time = 0.01 * np.arange(200)
+    q = np.outer(np.sin(time), [1.0, 1.0, 0.0])
+    log = unchecked_log(time=time, q=q, v=q, tau=q, name="run")
+
+    def stop(said: str) -> None:
+        raise KeyboardInterrupt
+
+    model: Any = SimpleNamespace(arm=three_axis(), require_torques=lambda: None)
+    dead = "run: column q3 is 0 in every row: if joint_3 moved, its encoder is dead"
+    with pytest.warns(InputWarning, match=dead), pytest.raises(KeyboardInterrupt):
+        diagnose(model, [log], stop)

@@ -1,4 +1,4 @@
-"""What lies far beyond an arm's limits is said; what may lie there is not."""
+"""What lies far beyond an arm's limits is said, and a joint that never moves; what may lie there is not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from synthetic import three_axis
 
 from armloop.data.log import MotionLog, unchecked_log
 from armloop.robot.arm import Arm
-from armloop.robot.plausibility import beyond_limits
+from armloop.robot.plausibility import beyond_limits, motionless
+from armloop.util.arrays import Array
 
 
 def arm(**limits: float) -> Arm:
@@ -49,3 +50,16 @@ def test_what_lies_far_beyond_the_limits(
     found = list(beyond_limits(arm(**limits), log(q, tau, unit)))
     assert len(found) == len(said)
     assert all(each in sentence for each, sentence in zip(said, found, strict=True))
+
+
+def test_a_joint_that_never_moves_by_a_digit_while_others_do() -> None:
+    time = 0.01 * np.arange(200)
+    shape = np.outer(np.sin(3 * time), [1.0, 1e-9, 0.0])
+
+    def at(q: Array) -> MotionLog:
+        return unchecked_log(time=time, q=q, v=shape, tau=shape, name="run")
+
+    (sentence,) = motionless(arm(), at(shape + np.array([0.0, 0.0, 0.3])))
+    assert sentence.startswith("column q3 is 0.3 in every row: if joint_3 moved, its encoder is dead")
+    # an arm that rests has no joint that should move
+    assert list(motionless(arm(), at(0 * shape))) == []

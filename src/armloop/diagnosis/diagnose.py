@@ -52,7 +52,7 @@ from armloop.diagnosis.zeros import sentences, settled
 from armloop.identification.validation.misrecorded import misrecorded
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import ReconstructedModel
-from armloop.robot.plausibility import say_beyond_limits
+from armloop.robot.plausibility import say_beyond_limits, say_motionless
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import one_thread
@@ -83,6 +83,7 @@ def diagnose(
             )
     require_different(logs)
     say_beyond_limits(model.arm, logs)
+    say_motionless(model.arm, logs)
     progress("conditioning the run like the model's training logs")
     logs, zeros = settled(model, logs)
     own_zeros = sentences(model, [log.name for log in logs], zeros)

@@ -1,4 +1,7 @@
-"""Range checks of a log against an arm's limits, and of a model's arm against a URDF: another unit, order or arm."""
+"""Range checks of a log against an arm's limits, and of a model's arm against a URDF: another unit, order or arm.
+
+And joints that never move: their encoders may be dead.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,8 @@ from armloop.util.doubts import warn
 
 #: So much of a joint's range may lie beyond its limits: those of software are narrower than those of hardware.
 _BEYOND = 0.25
+#: A joint that moves goes so far, rad or m.
+_MOVES = 1e-2
 #: So many times the effort limit may be measured: limits that last are lower than what a drive gives for a moment.
 _TIMES = 10.0
 #: Masses that differ by less than this part of them are one, written with other digits.
@@ -56,3 +61,20 @@ def require_made_for(made_for: Arm, arm: Arm, what: str) -> None:
                 f"model was made with, {other:.4g} kg in that of {arm.name}; the model goes by its own"
             )
             return
+
+
+def say_motionless(arm: Arm, logs: Sequence[MotionLog]) -> None:
+    """Say which joints' positions are one number throughout a log in which others move."""
+    for log in logs:
+        for sentence in motionless(arm, log):
+            warn(f"{log.name}: {sentence}")
+
+
+def motionless(arm: Arm, log: MotionLog) -> Iterator[str]:
+    """What of a log of as many joints never changes by a digit, while others move, a sentence a column."""
+    for j, joint in enumerate(arm.joints):
+        if np.ptp(log.q[:, j]) == 0 and np.ptp(log.q, axis=0).max() > _MOVES:
+            yield (
+                f"column q{j + 1} is {log.q[0, j] + 0.0:.6g} in every row: if {joint.name} moved, its encoder is dead, and "
+                "what is said of the other joints may be wrong; if it is locked or held, nothing can be said of it"
+            )

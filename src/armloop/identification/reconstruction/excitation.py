@@ -46,7 +46,8 @@ def check_excitation(arm: Arm, samples: Samples) -> None:
         if way < _LEAST_WAY:
             raise ExcitationError(
                 f"q{j + 1}: joint {joint.name!r} hardly moves (range {way:.3g} {joint.position_unit}); its terms cannot be "
-                "determined: log runs in which every joint moves"
+                "determined: log runs in which every joint moves, or lock one that never does: "
+                f"--lock {joint.name}=VALUE"
             )
         if moving < _FEWEST:
             raise ExcitationError(

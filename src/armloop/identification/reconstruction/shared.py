@@ -98,7 +98,7 @@ def check_moves(arm: Arm, counts: Array) -> None:
         if counts[j] < 100:
             raise ExcitationError(
                 f"q{j + 1}: joint {joint.name!r} moves in {int(counts[j])} samples, at least 100 are needed; "
-                "log runs in which every joint moves"
+                f"log runs in which every joint moves, or lock one that never does: --lock {joint.name}=VALUE"
             )
 
 
