@@ -26,7 +26,7 @@ class Source:
     """A log that says its number when it is read."""
 
     def __init__(self, number: int, length: int, noise: float = 0.0) -> None:
-        self.number, self.samples, self.noise = number, length, noise
+        self.number, self.samples, self.noise, self.name = number, length, noise, f"log {number}"
 
     def read(self) -> Source:
         return self
@@ -74,6 +74,9 @@ def test_blocks_are_numbered_on_from_log_to_log_and_short_logs_left_out(
     assert data.reference.samples.motion.starts.tolist() == [0, 6, 13]
     # the noisiest log's noise, for all
     assert {tuple(noise) for noise in asked} == {(1.0, 1.0)}
+    # a log in memory keeps its name, whatever was left out before it
+    named = [(name, int(kept.motion.time[0]), kept.motion.samples) for name, kept in data.by_log]
+    assert named == ([] if streamed else [(f"log {k}", 100 * k, N) for k, N in ((0, 6), (2, 7), (3, 4))])
 
 
 @pytest.mark.parametrize("make", [Data.streamed, Data.kept])

@@ -145,12 +145,14 @@ class Data:
         reference: samples for global statistics: all of them, or an even selection.
         workers: who computes sums over the chunks.
         progress: who is told how far a pass over logs that are not in memory is.
+        names: of the logs that the parts are made from, where they are kept in memory.
     """
 
     parts: Sequence[_Conditioned | Chunk]
     reference: Chunk
     workers: Workers
     progress: Progress = silent
+    names: Sequence[str] = ()
 
     @staticmethod
     def of(samples: Samples, options: Options, held_out: Mask | None = None) -> Data:
@@ -166,20 +168,27 @@ class Data:
             ShortRunError: no log has a run long enough for the filter.
         """
         speeds = Speeds.of_all(logs, how.cutoff_hz) if how.cutoff_hz > 0 else None
-        chunks, first = [], 0
+        chunks, names, first = [], [], 0
         for log in logs:
             chunk = _Conditioned(log, how, speeds, options, first).chunk()
             if chunk is not None:
                 chunks.append(chunk)
+                names.append(log.name)
                 first = int(chunk.blocks[-1]) + 1
         if not chunks:
             preprocess(logs, how, speeds)  # says how long a run must be
-        return Data(chunks, _joined(chunks), Serial())
+        return Data(chunks, _joined(chunks), Serial(), names=names)
 
     def nested(self) -> Data:
         """The same, in memory, with one more fold held out, which alone chooses the library."""
         chunks = [part.nested() for part in self.parts if isinstance(part, Chunk)]
-        return Data(chunks, self.reference.nested(), self.workers)
+        return replace(self, parts=chunks, reference=self.reference.nested())
+
+    @property
+    def by_log(self) -> list[tuple[str, Samples]]:
+        """Every log's name and samples; none of logs that are read when needed."""
+        chunks = [part for part in self.parts if isinstance(part, Chunk)]
+        return [(name, chunk.samples) for name, chunk in zip(self.names, chunks, strict=False)]
 
     @property
     def in_memory(self) -> bool:

@@ -34,6 +34,7 @@ from armloop.identification.reconstruction.libraries import (
 )
 from armloop.identification.reconstruction.library import METHODS, REFERENCE, Library
 from armloop.identification.reconstruction.options import Options, StepReport
+from armloop.identification.reconstruction.outlying_stretch import doubtful, outlying_stretches
 from armloop.identification.reconstruction.preparation import Prepared, prepared
 from armloop.identification.reconstruction.ripple import find_ripple
 from armloop.identification.reconstruction.ripple import notes as ripple_notes
@@ -47,6 +48,7 @@ from armloop.model import ReconstructedModel
 from armloop.model.added_effect import ripples
 from armloop.robot.arm import Arm
 from armloop.robot.plausibility import say_beyond_limits
+from armloop.util.doubts import warn
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Workers, one_thread
@@ -307,6 +309,8 @@ def _finished(
         progress("what laws of the catalogue find in runs left out of the regression")
         null = {"null": left_out_null(model, data, found, tried.library.shared)}
         model = replace(model, baseline={**model.baseline, **null})
+    for doubt in doubtful(outlying_stretches(model, data.by_log), model.torque_units):
+        warn(doubt)
     checks = check_physics(model)
     notes += checks.faults()
     if model.in_amperes:
