@@ -17,8 +17,10 @@ from armloop.identification.reconstruction.bandwidth import Bandwidth
 from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Blocks
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.preparation import Prepared, prepared
+from armloop.identification.reconstruction.torque_lag import Beside
 from armloop.laws.effects import Estimate
 from armloop.laws.effects.torque_ripple import TorqueRipple
+from armloop.laws.friction import FrictionTerm
 from armloop.model.added_effect import AddedEffect
 from armloop.util.progress import silent
 
@@ -38,8 +40,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         asked["filters"].append((lag, choosing))
         return Bandwidth(asked["corners"].get(lag, 6.0)), Blocks(2.0, 0.5, 0.1)
 
-    def lag(runs: Any, arm: Any, how: Any, aside: Any, seconds: float, ripples: Any) -> Any:
-        asked["ripples"] = dict(ripples)
+    def lag(runs: Any, arm: Any, how: Any, aside: Any, seconds: float, beside: Any) -> Any:
+        asked["beside"] = beside
         return SimpleNamespace(seconds=asked["lags"].pop(0))
 
     def zeros(kept: Any, *_: Any) -> Any:
@@ -122,27 +124,28 @@ def test_a_library_that_is_named_is_not_asked_whether_the_logs_suit_it(
         (0.008, 0.0, (100.0,), True),
         (0.008, 0.0075, (100.0,), False),  # half a millisecond is not felt below 8.5 Hz
         (0.0, 0.003, (100.0,), False),
-        (0.008, 0.003, (), False),
+        (0.008, 0.003, (), True),
     ],
 )
-def test_a_lag_is_looked_for_anew_beside_the_ripples_that_are_found(
+def test_a_lag_is_looked_for_anew_beside_the_friction_and_the_ripples_that_are_found(
     late: float, again: float, orders: tuple[float, ...], anew: bool, asked: dict[str, Any]
 ) -> None:
     asked["lags"], asked["corners"] = [late, late], dict.fromkeys((late, again), 8.5)
     ready = made()
+    friction = [[FrictionTerm("viscous")], [FrictionTerm("hysteresis", parameter=3e-4)], []]
+    effects = [AddedEffect(TorqueRipple(2), ripple(order)) for order in orders]
     tried: Any = SimpleNamespace(
-        found=SimpleNamespace(effects=[AddedEffect(TorqueRipple(2), ripple(order)) for order in orders]),
-        conditioning=USUAL,
+        found=SimpleNamespace(effects=effects, friction=friction), conditioning=USUAL
     )
     asked["lags"] = [again, again]
 
-    def preparing(ripples: Any) -> Prepared:
-        return prepared([LOG], [LOG], three_axis(), [USUAL], None, Options(), silent, ripples=ripples)
+    def preparing(beside: Any) -> Prepared:
+        return prepared([LOG], [LOG], three_axis(), [USUAL], None, Options(), silent, beside=beside)
 
     other = module._in_step(ready, tried, preparing)
     assert (other is not None) is anew
     if other is not None:
-        assert other.late == again and asked["ripples"] == {2: orders}
+        assert other.late == again and asked["beside"] == Beside({2: orders} if orders else {}, friction)
 
 
 def ripple(order: float) -> dict[str, Estimate]:

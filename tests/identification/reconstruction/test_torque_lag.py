@@ -18,7 +18,9 @@ from armloop.data.signals import FELT, Conditioning, preprocess
 from armloop.diagnosis import diagnose
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
 from armloop.identification.reconstruction import torque_lag as torque_lags
-from armloop.identification.reconstruction.torque_lag import TorqueLag, torque_lag
+from armloop.identification.reconstruction.torque_lag import Beside, TorqueLag, torque_lag
+from armloop.laws.friction import FrictionTerm
+from armloop.laws.hysteresis import stop_operator
 from armloop.model import load_model
 
 DEAD = 0.008
@@ -93,7 +95,7 @@ def test_a_late_speed_makes_no_lag_of_the_torque_below_half_the_corner(dead: flo
     assert 4.25 * late[0].velocity_lag < FELT < 8.5 * late[0].velocity_lag
     intervals = [np.zeros((0, 2))] * 2
     for corner in (8.5, 4.25):
-        own = torque_lags._found(late, three_axis(), Conditioning(corner), intervals, 2.0, 8.5, {})
+        own = torque_lags._found(late, three_axis(), Conditioning(corner), intervals, 2.0, 8.5, Beside())
         assert own.seconds == pytest.approx(dead, abs=3e-4)
 
 
@@ -118,7 +120,7 @@ def test_both_corners_see_the_same_speed(monkeypatch: pytest.MonkeyPatch) -> Non
     corners: list[tuple[float, ...]] = []
 
     def own(
-        logs: Any, arm: Any, how: Conditioning, aside: Any, seconds: float, felt_hz: float, ripples: Any
+        logs: Any, arm: Any, how: Conditioning, aside: Any, seconds: float, felt_hz: float, beside: Any
     ) -> TorqueLag:
         corners.append((how.cutoff_hz, felt_hz, how.smear))
         return TorqueLag(0.01, 1e-4, np.full(3, 0.01))
@@ -245,5 +247,29 @@ def test_ripples_that_the_controller_answers_to_are_no_lag_beside_them() -> None
     logs = [rippling(seed, 60.0) for seed in (1, 2, 3)]
     given = logs, three_axis(), Conditioning(8.5), [np.zeros((0, 2))] * len(logs), 2.0
     assert torque_lag(*given).seconds < -0.01
-    beside = torque_lag(*given, dict.fromkeys((1, 2, 3), (60.0,)))
+    beside = torque_lag(*given, Beside(dict.fromkeys((1, 2, 3), (60.0,))))
     assert beside.seconds == 0.0 and np.abs(beside.joints).max() < 5e-4
+
+
+def bristly(seed: int) -> MotionLog:
+    """A run whose friction, three times all else, sets in over bristles of 0.3 mrad."""
+    motion = fourier_motion(40.0, 250.0, seed, size=0.3)
+    stops = np.stack([stop_operator(q, 3e-4, motion.starts) for q in motion.q.T], axis=1)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot)
+    tau = tau + 3 * stops * np.sqrt(np.mean(tau**2, axis=0)) + VISCOUS * motion.v
+    return measured(motion, tau, seed, name=f"run {seed}")
+
+
+def test_friction_of_which_no_usual_law_has_the_memory_is_no_lag_beside_it() -> None:
+    logs = [bristly(seed) for seed in (1, 2, 3)]
+    given = logs, three_axis(), Conditioning(8.5), [np.zeros((0, 2))] * len(logs), 2.0
+    assert torque_lag(*given).seconds > 0.02
+    own = [[FrictionTerm("viscous"), FrictionTerm("hysteresis", parameter=3e-4)]] * 3
+    assert torque_lag(*given, Beside(friction=own)).seconds == 0.0
+
+
+def test_what_is_known_of_friction_is_regressed_once_where_it_acts_as_joints_turn() -> None:
+    known = ["viscous", "hysteresis", "smooth_sign", "load_hysteresis"]
+    own = [FrictionTerm(kind, parameter=p) for kind, p in zip(known, (0.0, 3e-4, 0.01, 1e-3), strict=True)]
+    plain, more = Beside().terms(2), Beside(friction=[own, []]).terms(2)
+    assert plain[0] == plain[1] == more[1] and more[0] == [*plain[0], own[1]]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
-from types import MappingProxyType
 from typing import Any
 
 from armloop.data.log import MotionLog
@@ -15,7 +14,7 @@ from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Bl
 from armloop.identification.reconstruction.encoder_zeros import EncoderZeros, encoder_zeros
 from armloop.identification.reconstruction.held_out import held_out_intervals
 from armloop.identification.reconstruction.options import Options
-from armloop.identification.reconstruction.torque_lag import Ripples, TorqueLag, torque_lag
+from armloop.identification.reconstruction.torque_lag import Beside, TorqueLag, torque_lag
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress
@@ -99,7 +98,7 @@ def prepared(
     progress: Progress,
     *,
     corrected: bool = True,
-    ripples: Ripples = MappingProxyType({}),
+    beside: Beside | None = None,
 ) -> Prepared:
     """Choose how logs are preprocessed.
 
@@ -109,7 +108,7 @@ def prepared(
         usual: filters of the libraries that are going to be regressed.
         given: the filter, where the user has said which.
         corrected: whether the torque's lag and the encoders' zeros are looked for.
-        ripples: orders of the torque's ripples that are known, by their joints (1-based).
+        beside: what is known of the arm where the torque's lag is looked for.
     """
     runs = kept or logs
     late, corners = None, set[float]()
@@ -125,7 +124,7 @@ def prepared(
             break
         corners.add(bandwidth.cutoff_hz)
         progress("whether the torque is in step with the motion")
-        found = torque_lag(runs, arm, filters[0], aside, blocks.seconds, ripples)
+        found = torque_lag(runs, arm, filters[0], aside, blocks.seconds, beside)
         if not found.seconds:
             break
         # what is out of step asks for a low corner, and a lag is known best at a high one

@@ -42,6 +42,7 @@ from armloop.identification.reconstruction.shared import motion_range, slowest_s
 from armloop.identification.reconstruction.stances import as_it_stands, stance_history
 from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.identification.reconstruction.torque_lag import Beside
 from armloop.identification.scoring import Score, residual
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
@@ -219,7 +220,7 @@ def reconstruct(
         again = _in_step(ready, _chosen(tried), partial(preparing, arm=arm))
         if again is not None:
             ready = again
-            progress("the torque's ripples had a part in when it seems to be recorded: anew beside them")
+            progress("what was found has a part in when the torque seems to be recorded: anew beside it")
             tried, part = _compared(wanted, refused, attempt, ready)
             _find_ripple(_chosen(tried), ready.logs)
     return _finished(tried, part, method, ready, progress, recorded)
@@ -258,11 +259,10 @@ def _chosen(libraries: Sequence[Contender]) -> Attempt:
 
 
 def _in_step(ready: Prepared, tried: Attempt, preparing: Callable[..., Prepared]) -> Prepared | None:
-    """The logs with another lag of their torque, beside the ripples found; None where it is felt to be the same."""
-    orders = ripples(tried.found.effects)
-    if not (orders and ready.late):
+    """The logs with another lag of their torque, beside friction and ripples found; None where it is felt to be the same."""
+    if not ready.late:
         return None
-    again = preparing(ripples=orders)
+    again = preparing(beside=Beside(ripples(tried.found.effects), tried.found.friction))
     return again if abs(again.late - ready.late) * tried.conditioning.cutoff_hz >= FELT else None
 
 

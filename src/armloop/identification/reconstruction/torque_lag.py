@@ -12,15 +12,15 @@ A stiff controller answers to the noise of a coarse encoder, which then is in th
 squares take what it makes of one for a lag, or hide one. The same columns of a smoother motion, in which that noise is not,
 are instruments: where these contradict least squares (Hausman, Econometrica 46, 1978), they are believed (Janot, Vandanjon
 and Gautier, IEEE Transactions on Control Systems Technology 22, 2014). Ripples of the gears are such a noise, too, which the
-controller answers to: once they are known they are regressed with the rest.
+controller answers to; and where friction has a memory, or falls, as none of the laws here does, that is a lag. Once they are
+known they are regressed with the rest.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -68,8 +68,30 @@ _EXACT = 1e-9
 #: Laws whose torque, where a joint turns round, would else be a lag: dry friction that falls with the speed leads.
 _FRICTION = (*FRICTION, *(FrictionTerm("stribeck", parameter=speed) for speed in (0.03, 0.1, 0.3)))
 
-#: Orders of ripples by their joints (1-based).
-Ripples = Mapping[int, Sequence[float]]
+#: Kinds of friction that act where a joint turns round, and ask for no load.
+_TURNS = ("hysteresis", "smooth_sign", "stribeck", "stribeck_peak")
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What is known of an arm beside its masses.
+
+    Attributes:
+        ripples: orders of the torque's ripples by their joints (1-based).
+        friction: terms of each joint's friction, if they are known.
+    """
+
+    ripples: Mapping[int, Sequence[float]] = field(default_factory=dict)
+    friction: Sequence[Sequence[FrictionTerm]] = ()
+
+    def terms(self, n: int) -> list[list[FrictionTerm]]:
+        """The friction that is regressed at each of n joints: laws that most have, and what is known of its own."""
+        usual = {(term.kind, term.parameter) for term in _FRICTION}
+        known = self.friction or [()] * n
+        return [
+            [*_FRICTION, *(t for t in own if t.kind in _TURNS and (t.kind, t.parameter) not in usual)]
+            for own in known
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +136,7 @@ def torque_lag(
     how: Conditioning,
     aside: Sequence[Array],
     block_seconds: float,
-    ripples: Ripples = MappingProxyType({}),
+    beside: Beside | None = None,
 ) -> TorqueLag:
     """The lag of the logs' torque.
 
@@ -126,17 +148,18 @@ def torque_lag(
         how: filter.
         aside: per log, (B, 2) intervals that take no part.
         block_seconds: length of pieces whose errors are independent.
-        ripples: orders of the torque's ripples that are known, by their joints (1-based).
+        beside: what is known of the arm; nothing by default.
     """
+    beside = beside or Beside()
     placed = placed_runs(logs, how.oversampling * how.cutoff_hz)
     some, left_out = [run for _, run in placed], [aside[k] for k, _ in placed]
-    found = _found(some, arm, how, left_out, block_seconds, how.cutoff_hz, ripples)
+    found = _found(some, arm, how, left_out, block_seconds, how.cutoff_hz, beside)
     if abs(found.seconds) * how.cutoff_hz < FELT or not found.clear:
         return replace(found, seconds=0.0)
     # what a joint that sticks shows before it moves is a lead below any corner: it is kept out twice as far
     slower = replace(how, cutoff_hz=how.cutoff_hz / _SLOWER, smear=2 * how.smear)
     # where v is late, it is as late below half the corner: the torque's own lag alone may differ
-    slow = _found(some, arm, slower, left_out, block_seconds, how.cutoff_hz, ripples)
+    slow = _found(some, arm, slower, left_out, block_seconds, how.cutoff_hz, beside)
     allowed = max(_SURE * float(np.hypot(found.std_error, slow.std_error)), _ALIKE * abs(found.seconds))
     return found if abs(found.seconds - slow.seconds) <= allowed else replace(found, seconds=0.0)
 
@@ -148,7 +171,7 @@ def _found(
     aside: Sequence[Array],
     block_seconds: float,
     felt_hz: float,
-    ripples: Ripples,
+    beside: Beside,
 ) -> TorqueLag:
     """The lag below one corner; a standard error without bound where too little moves."""
     base = BaseParameters.of_arm(arm, rotors=True)
@@ -171,8 +194,8 @@ def _found(
             _Part(
                 samples,
                 rows.T,
-                _columns(design, samples, rows.T, ripples),
-                _columns(design, replace(samples, motion=slower), rows.T, ripples, rates=True),
+                _columns(design, samples, rows.T, beside),
+                _columns(design, replace(samples, motion=slower), rows.T, beside, rates=True),
                 np.broadcast_to(blocks, rows.T.shape)[rows.T],
             )
         )
@@ -183,20 +206,24 @@ def _found(
     return by_instruments if contradicted else plain
 
 
-def _columns(design: Design, samples: Samples, rows: Mask, ripples: Ripples, rates: bool = False) -> Array:
+def _columns(design: Design, samples: Samples, rows: Mask, beside: Beside, rates: bool = False) -> Array:
     """(R, p) columns of all coefficients in the rows (n, N) of each joint; with their rates (2, R, p)."""
     n, shared = design.arm.n, design.count
     found: list[list[Array]] = [[] for _ in range(n)]
-    for part in design.walk(samples, [list(_FRICTION)] * n):
+    friction = beside.terms(n)
+    before = np.cumsum([0, *map(len, friction)])
+    for part in design.walk(samples, friction):
         now = slice(part.first, part.first + len(part.X))
         inside = rows[part.joint, now]
-        where = np.where(part.where < shared, part.where, part.where + part.joint * len(_FRICTION))
+        where = np.where(part.where < shared, part.where, part.where + before[part.joint])
         both = [part.X] + ([rate_along(stretch(samples, now.start, now.stop), part.X)] if rates else [])
-        own = np.zeros((len(both), int(inside.sum()), shared + n * len(_FRICTION)))
+        own = np.zeros((len(both), int(inside.sum()), shared + before[-1]))
         own[:, :, where] = np.stack(both)[:, inside]
         found[part.joint].append(own)
     X = np.concatenate([piece for pieces in found for piece in pieces], axis=1)
-    X = np.concatenate([X, *(_rippling(samples, rows, *one, rates) for one in ripples.items())], axis=2)
+    X = np.concatenate(
+        [X, *(_rippling(samples, rows, *one, rates) for one in beside.ripples.items())], axis=2
+    )
     return X if rates else np.asarray(X[0])
 
 
