@@ -178,6 +178,16 @@ def test_a_diagnosis_has_objects_for_effects(model, found, tmp_path):
     ]
 
 
+def test_what_is_said_of_other_logs_is_a_diagnosis_of_its_own(model, found):
+    inner = found._found
+    beside = al.Diagnosis(inner.beside([replace(inner, logs=("other",))]), model, found._compensation)
+    (other,) = beside.apart
+    assert (other.logs, other.verdict, other.apart) == (["other"], "effects_found", [])
+    assert other.error == found.error and other.effects[0].effect.name == "viscous_friction"
+    assert beside.logs == found.logs == list(inner.logs) and found.apart == []
+    assert "other, judged apart: effects found" in str(beside)
+
+
 def test_a_score_and_a_log_show_themselves(model, tmp_path):
     log = run(5, 6)
     score = al.evaluate(model, log)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,7 @@ class Diagnosis:
         model: the model with the effects found.
         error: RMSE per joint on data not fitted: ``before``, ``after``, ``noise_floor``.
         before: the model that was diagnosed.
+        logs: names of the logs that this is said of; of others, in which the arm was not the same, ``apart`` has diagnoses.
     """
 
     def __init__(self, found: Found, before: ReconstructedModel, compensation: Closing) -> None:
@@ -48,6 +50,13 @@ class Diagnosis:
         self.model = Model.of(found.model)
         self.effects: list[AddedEffect] = list(found.model.effects[len(before.effects) :])
         self.error: dict[str, Any] = found.errors()
+        self.logs = list(found.logs)
+
+    @cached_property
+    def apart(self) -> list[Diagnosis]:
+        """Diagnoses of logs in which the arm was not the same."""
+        plain = self.before.plain()
+        return [Diagnosis(each, self.before, close(plain, each.model, each.samples)) for each in self._found.apart]
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
