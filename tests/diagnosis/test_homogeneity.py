@@ -102,7 +102,7 @@ def test_logs_of_the_same_arm_are_judged_together(model: ReconstructedModel) -> 
 
 def test_which_logs_are_as_the_model(model: ReconstructedModel) -> None:
     def pushed(motion: Motion) -> np.ndarray:
-        return np.asarray(((motion.time > 9) & (motion.time < 10.5))[:, None] * [0.5, 0.0, 0.0])
+        return np.asarray(((motion.time > 9) & (motion.time < 9.6))[:, None] * [0.02, 0.0, 0.0])
 
     logs = [log_of(1, wave), log_of(3, nothing), log_of(4, pushed)]
     assert homogeneity.as_modelled(model, logs).tolist() == [False, True, False]

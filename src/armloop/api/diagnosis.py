@@ -56,7 +56,9 @@ class Diagnosis:
     def apart(self) -> list[Diagnosis]:
         """Diagnoses of logs in which the arm was not the same."""
         plain = self.before.plain()
-        return [Diagnosis(each, self.before, close(plain, each.model, each.samples)) for each in self._found.apart]
+        return [
+            Diagnosis(each, self.before, close(plain, each.model, each.samples)) for each in self._found.apart
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""

@@ -28,7 +28,7 @@ def run(options: Evaluate) -> None:
 
     model, logs = model_and_logs(options)
     # here, for it needs what takes longer to import than a fault of the input to be told
-    from armloop.identification.validation.misrecorded import misrecorded
+    from armloop.identification.validation.misrecorded import misrecorded, turned_joints
 
     require_different(logs)
     say_beyond_limits(model.arm, logs)
@@ -38,7 +38,8 @@ def run(options: Evaluate) -> None:
         raise InputError(
             f"{logs[0].name}: every tau is zero throughout; give a log that holds the joints' torques"
         )
-    if wrong := misrecorded(model, samples):
+    whole = misrecorded(model, samples)
+    for wrong in [whole] if whole else turned_joints(model, samples):
         warn(f"{', '.join(log.name for log in logs)}: {wrong}")
     result = score(model, samples)
     if options.json:

@@ -41,8 +41,7 @@ def as_modelled(model: ReconstructedModel, logs: Sequence[MotionLog]) -> Mask:
     runs = [Evidence.of(model, preprocess([log], model.conditioning), asked) for log in logs]
     scores = [Known.of(run).fit.score for run in runs]
     quiet = [
-        run.rows.any() and bool((score.energy <= enough(run, score)).all())
-        for run, score in zip(runs, scores, strict=True)
+        bool((score.energy <= enough(run, score)).all()) for run, score in zip(runs, scores, strict=True)
     ]
     if all(quiet):
         return np.ones(len(logs), dtype=bool)

@@ -87,6 +87,33 @@ def test_a_factor_is_told_from_three_times_on_or_with_the_other_sign(
     assert (said_to_be in words) == (words != "") if said_to_be else words == ""
 
 
+def test_single_torques_of_another_sign_or_gain_are_told_by_an_evaluation(
+    model: ReconstructedModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = run(1, 15.0)
+    samples = preprocess([log], model.conditioning)
+
+    def told(*gains: float) -> list[str]:
+        return misrecorded_module.turned_joints(model, replace(samples, tau=samples.tau * np.array(gains)))
+
+    assert told(1, 1, 1) == told(1, 2.9, 0.35) == []
+    assert told(1, -1, 1) == ["tau2 has the other sign than what the model gives; check the joint's sign"]
+    assert told(5, 1, -0.25) == [
+        "tau1 is about 5 times what the model gives; check the joint's unit and gain",
+        "tau3 is about -0.25 times what the model gives; check the joint's unit and gain",
+    ]
+    # what is no factor of the model's torque is none
+    other = replace(
+        samples,
+        tau=samples.tau + np.std(samples.tau, axis=0) * np.sign(np.sin(3 * samples.motion.time))[:, None],
+    )
+    assert misrecorded_module.turned_joints(model, other) == []
+    model.save(tmp_path / "model.json")
+    write_log(tmp_path / "run.csv", replace(log, tau=log.tau * [1, -1, 1]))
+    assert main(["evaluate", str(tmp_path / "model.json"), str(tmp_path / "run.csv")]) == 0
+    assert "run: tau2 has the other sign than what the model gives" in capsys.readouterr().err
+
+
 def test_a_log_that_the_model_explains_by_half_is_not_asked_of(
     model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:

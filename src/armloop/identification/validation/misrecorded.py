@@ -84,6 +84,28 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
     return ""
 
 
+def turned_joints(model: ReconstructedModel, samples: Samples) -> list[str]:
+    """Gross errors of single torques, a sentence each: a factor far from one, or negative, of what the model gives.
+
+    To a diagnosis that is a gain of the sensor.
+    """
+    left, found = _relative(residual(model, samples), samples), []
+    predicted = smooth(samples, model.predict(samples.motion))
+    for j in np.flatnonzero(left >= _POOR):
+        moving = samples.moving[:, j]
+        tau, own = samples.tau[moving, j], predicted[moving, j]
+        gain = float(tau @ own / max(own @ own, TINY))
+        rest = np.sqrt(np.mean((tau - gain * own) ** 2) / np.mean(tau**2))
+        if not 1 / FAR <= gain <= FAR and rest <= _BETTER * left[j]:
+            sign = 1 / _SIGN <= -gain <= _SIGN
+            what = "has the other sign than what" if sign else f"is about {float(f'{gain:.2g}'):g} times what"
+            found.append(
+                f"tau{j + 1} {what} the model gives; check the joint's "
+                + ("sign" if sign else "unit and gain")
+            )
+    return found
+
+
 def _relative(error: Array, samples: Samples) -> Array:
     """(n,) error over torque of the joints that slide, root mean squares; 0 of those that do not."""
     nrmse = score_errors(error, samples.tau, samples.moving).moving["nrmse"]
