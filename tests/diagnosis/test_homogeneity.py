@@ -107,7 +107,8 @@ def test_which_logs_are_as_the_model(model: ReconstructedModel) -> None:
     logs = [log_of(1, wave), log_of(3, nothing), log_of(4, pushed)]
     assert homogeneity.as_modelled(model, logs).tolist() == [False, True, False]
     assert homogeneity.as_modelled(model, logs[1:2]).tolist() == [False]
-    assert homogeneity.as_modelled(model, logs[1:]).tolist() == [True, False]
+    # an event is asked of where another log has changed: it would be lost where that is judged alone
+    assert homogeneity.as_modelled(model, logs[1:]).tolist() == [True, True]
 
 
 def test_what_a_log_does_not_show_contradicts_nothing(
@@ -120,6 +121,12 @@ def test_what_a_log_does_not_show_contradicts_nothing(
     resting = preprocess([replace(still, q=still.q * [0, 1, 1], v=still.v * [0, 1, 1])], model.conditioning)
     rows = homogeneity.Evidence.of(model, resting, []).rows
     assert not rows[:, 0].any() and not homogeneity.is_contradicted(half_changed, model, resting)
+
+
+def test_what_has_no_law_is_lacked_by_a_log_that_is_as_the_model(model: ReconstructedModel) -> None:
+    unnamed: Any = SimpleNamespace(laws=[SimpleNamespace(parameters={})])
+    nobody: Any = None
+    assert homogeneity.is_contradicted(unnamed, model, nobody)
 
 
 def told(after: list[float], contacts: int = 0, law: bool | None = None) -> Any:
