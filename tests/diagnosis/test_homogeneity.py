@@ -16,11 +16,16 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose, homogeneity
+from armloop.diagnosis.account import Account, best_account
+from armloop.diagnosis.contacts import find_contacts
+from armloop.diagnosis.evidence import Evidence
+from armloop.laws.effects import hypotheses
 from armloop.model import ReconstructedModel
 from armloop.reports.diagnosis_report import diagnosis_report
 from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.schemas.answers import DiagnosisData
 from armloop.schemas.checking import checked
+from armloop.util.progress import silent
 
 Law = Callable[[Motion], np.ndarray]
 
@@ -93,11 +98,52 @@ def test_of_logs_that_changed_each_in_its_way_the_last_is_the_arm(model: Reconst
 
 
 def test_logs_of_the_same_arm_are_judged_together(model: ReconstructedModel) -> None:
-    found = diagnose(model, [log_of(1, wave), log_of(2, wave)], jobs=1)
+    said: list[str] = []
+    found = diagnose(model, [log_of(1, wave), log_of(2, wave)], said.append, jobs=1)
+    assert not any("by itself" in words or "by themselves" in words for words in said)
     assert (found.named, found.logs, found.apart) == ([("torque_ripple", 1)], ("run_1", "run_2"), ())
     assert "apart" not in found.to_dict() and not found.reasons
     clean = diagnose(model, [log_of(3, nothing), log_of(4, nothing)], jobs=1)
     assert (clean.verdict, clean.logs, clean.apart) == ("no_effect", ("run_3", "run_4"), ())
+
+
+def test_a_log_that_does_not_show_what_changed_is_judged_with_the_others(model: ReconstructedModel) -> None:
+    moves = motion_of(3, 24.0)
+    q, v, vdot = (x * [0, 1, 1] for x in (moves.q, moves.v, moves.vdot))
+    motion = replace(moves, q=q, v=v, vdot=vdot)
+    resting = replace(measured(motion, torque(motion), 3, 0.01), name="resting")
+    found = diagnose(model, [log_of(1, wave), resting], jobs=1)
+    assert (found.named, found.logs, found.apart) == ([("torque_ripple", 1)], ("run_1", "resting"), ())
+
+
+def account_of(model: ReconstructedModel, *logs: MotionLog) -> Account:
+    whole = Evidence.of(model, preprocess(logs, model.conditioning), hypotheses(model.arm))
+    return best_account(whole, find_contacts(whole, whole.residual([])), silent)
+
+
+def test_an_account_for_each_log_pays_for_what_it_states(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Logs of one law are likelier with one account, of two laws with two; of other samples nothing is said."""
+    waves = [log_of(1, wave), log_of(2, wave)]
+    each = [account_of(model, log) for log in waves]
+    assert not homogeneity.are_unlike(account_of(model, *waves), each)
+    unlike = [waves[0], log_of(2, spring)]
+    together, apart = account_of(model, *unlike), [account_of(model, log) for log in unlike]
+    assert homogeneity.are_unlike(together, apart) and not homogeneity.are_unlike(together, apart[:1])
+    # the common account pays for the events of a log, and for no law
+    asked: list[int] = []
+    monkeypatch.setattr(homogeneity, "price", lambda _, effects: asked.append(len(effects)) or 0.0)
+    first = len(apart[0].whole.samples.motion.time)
+    event: Any = SimpleNamespace(
+        rows=np.arange(together.whole.rows.shape[0]) == first, added=SimpleNamespace(effect="push")
+    )
+    scored: Any = replace(together, contacts=[])
+    monkeypatch.setattr(
+        type(scored), "everywhere", lambda self, residual, rows: apart[0].score(apart[0].evidence.rows)
+    )
+    homogeneity.are_unlike(replace(scored, contacts=[event]), apart)
+    assert asked == [0, 1]
 
 
 def test_which_logs_are_as_the_model(model: ReconstructedModel) -> None:

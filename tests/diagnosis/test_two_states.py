@@ -54,6 +54,8 @@ def test_what_is_short_is_none_and_a_change_within_rest_is_where_it_explains_mos
     early = (time > 9.5) & (time > 4.3)
     (interval,), _ = two_states.intervals_of(own, early, run_of, better, counted)
     assert interval.start == pytest.approx(11.3, abs=0.05) and interval.gap == pytest.approx(4.0, abs=0.1)
+    (interval,), _ = two_states.intervals_of(own, ~early, run_of, -better, -counted)
+    assert interval.end == pytest.approx(11.3, abs=0.05) and interval.gap == pytest.approx(4.0, abs=0.1)
     (interval,), _ = two_states.intervals_of(own, time < 10, run_of, -better)
     assert interval.start == motion.time[0] and interval.end == pytest.approx(11.3, abs=0.05)
 
