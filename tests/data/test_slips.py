@@ -39,6 +39,28 @@ def test_a_large_slip_is_refused_with_the_time_and_what_it_is() -> None:
         stepped([0.0, 0.2, 0.0])
 
 
+def test_a_rest_before_a_jump_is_no_encoder_that_is_stuck() -> None:
+    """Where all joints jump, runs are joined; where one rests afterwards, too, it has slipped."""
+    moves = run(2, 12.0)
+    rows = np.arange(moves.samples)
+    still = np.where(rows < 600, 300, rows)
+    with pytest.raises(LogError, match=r"column q\d, row 601 .*jumps by .*leave a gap in time between runs"):
+        MotionLog.from_arrays(moves.time, moves.q[still], moves.tau)
+    q = moves.q.copy()
+    q[300:600, 1], q[600:900, 1] = q[299, 1], q[299, 1] + 0.2
+    q[900:, 1] += q[899, 1] - q[900, 1]
+    with pytest.raises(LogError, match=r"column q2, row 601 .*jumps by 0\.2"):
+        MotionLog.from_arrays(moves.time, q, moves.tau)
+    q[600:900, 1] = moves.q[600:900, 1] + 0.2
+    brief = moves.q.copy()
+    brief[588:600, 1] = brief[588, 1]
+    brief[600:, 1] += 0.3
+    with pytest.raises(LogError, match=r"column q2, row 601 jumps by"):
+        MotionLog.from_arrays(moves.time, brief, moves.tau)
+    with pytest.raises(LogError, match=r"column q2, row 300 .*stands still to the last digit for 2\.4 s"):
+        MotionLog.from_arrays(moves.time, q, moves.tau)
+
+
 def test_what_is_repaired_happens_to_all_joints_or_is_the_motions_own_is_none() -> None:
     assert not list(slips(recorded(stepped([0.0, 0.03, 0.0], last=2))))
     assert not list(slips(recorded(stepped([0.03, 0.03, 0.03]))))

@@ -193,6 +193,19 @@ def test_what_grows_all_along_has_no_instant(model: ReconstructedModel) -> None:
     assert answers == [True, False] * 3
 
 
+def test_a_step_of_an_angle_is_known_to_twice_the_filters_reach_at_best(model: ReconstructedModel) -> None:
+    """Rates and torques that are made of it ring, before the filter and after."""
+    points = points_of(model, slipped(2, 15.0, 0.03))
+    rings = 2 * points.evidence.samples.reach
+    for name, least in (("encoder_offset", rings), ("torque_offset", 0.0)):
+        part = part_of(points, name)[0]
+        cut = points.best(part)[1]
+        error, instant = points.error(part, cut), points.onset(part, cut).time
+        assert error >= least
+        if least:
+            assert abs(instant - 15.0) < 3 * error < 8 * rings
+
+
 def test_of_several_logs_the_one_that_it_begins_in_is_found(model: ReconstructedModel) -> None:
     """Their clocks pass the same times: nothing tells which was recorded first, and each may have it or not."""
     first, then = run(6, 20.0), log_of(7, lambda m: rubs_more(m, 9.0), 20.0)

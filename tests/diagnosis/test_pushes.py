@@ -16,6 +16,7 @@ from armloop.diagnosis import pushes
 from armloop.diagnosis.event_size import event_size_error
 from armloop.laws.effects import effect
 from armloop.robot.arm import load_arm
+from armloop.util.arrays import TINY
 
 Shares = dict[str, float]
 
@@ -197,9 +198,9 @@ class TestParameters:
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         arm = load_arm("scara")
-        found = self.trial(
-            monkeypatch, pushes._Kind(effect("external_torque", 3)), arm, shown=[2]
-        ).added.parameters
+        made = self.trial(monkeypatch, pushes._Kind(effect("external_torque", 3)), arm, shown=[2])
+        found = made.added.parameters
+        assert made.clear == pytest.approx(found["torque"].value / max(found["torque"].std_error, TINY))
         assert found["torque"].value == pytest.approx(2.0) and found["torque"].unit == "N"
         assert found["posture"].unit == "rad or m"
         assert (found["start"].value, found["end"].value) == pytest.approx((0.1, 0.29))
