@@ -32,18 +32,19 @@ def test_a_richer_library_for_fewer_joints() -> None:
     assert {(each.N2, each.second) for each in chosen} == {(2, "velocity")}
 
 
-def _moving(N: int = 3000) -> tuple[Any, Any, np.ndarray]:
-    """Evidence of two joints of which every other sample of joint 2 counts; its rows, weighed by 1/4 N·m."""
-    rng = np.random.default_rng(3)
-    given = Motion(np.arange(float(N)), *rng.uniform(-2, 2, (3, N, 2)), np.array([0]))
-    rows = np.ones((N, 2), dtype=bool)
+def _moving(N: int = 3000, seven: bool = False) -> tuple[Any, Any, np.ndarray]:
+    """Evidence of two (seven) joints of which every other sample of joint 2 counts; its rows, weighed by 1/4 N·m."""
+    rng, n = np.random.default_rng(3), 7 if seven else 2
+    given = Motion(np.arange(float(N)), *rng.uniform(-2, 2, (3, N, n)), np.array([0]))
+    rows = np.ones((N, n), dtype=bool)
     rows[1::2, 1] = False
-    arm = SimpleNamespace(revolute=np.array([True, True]))
+    # one of seven slides
+    arm = SimpleNamespace(revolute=np.array([True, True, *(k > 0 for k in range(n - 2))]), n=n)
     evidence = SimpleNamespace(
         rows=rows,
-        samples=Samples(given, np.zeros((N, 2)), rows, 1.0),
+        samples=Samples(given, np.zeros((N, n)), rows, 1.0),
         model=SimpleNamespace(arm=arm),
-        scale=np.full(2, 0.25),
+        scale=np.full(n, 0.25),
     )
     joint = np.nonzero(rows)[1]
     sample = np.nonzero(rows)[0]
@@ -91,6 +92,26 @@ def test_a_cam_that_rubs_on_the_way_up_alone_is_a_law_of_the_joint_and_its_direc
     # of other joints' waves, or its own with a speed, far more functions would have to be told apart
     names = names_of(library_of((True,) * 2), 1)
     assert not {"sin(3*q1)*sign(v2)", "sin(3*q2)*v2*sign(v2)"} & set(names)
+    # an arm of many joints has a smaller library, and these waves all the same
+    for joints in (2, 7):
+        names = names_of(library_of((True,) * joints), 1)
+        assert len(set(names)) == len(names) and {"sin(3*q2)", "cos(3*q2)*sign(v2)"} <= set(names)
+        assert ("sin(3*q1)" in names) == (joints == 2)
+    assert "sin(3*q2)" not in names_of(library_of((True, False, *(True,) * 5)), 1)
+
+
+def test_the_columns_of_many_joints_are_those_of_their_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As filtered ones are, which are made of the names."""
+    evidence, after, _ = _moving(seven=True)
+    made = law_selection.LawSelection(evidence, after, 1)
+    monkeypatch.setattr(law_selection, "smooth", lambda samples, x: x)
+    some = [
+        k for k, name in enumerate(made.names) if name in ("sin(3*q2)", "cos(3*q2)*sign(v2)", "q3*v2", "v2^3")
+    ]
+    named = law_selection._filtered(evidence, 1, [made.names[k] for k in some])
+    folds = after.stacked.fold[after.stacked.joint == 1]
+    for k in range(FOLDS):
+        np.testing.assert_allclose(made._X[k][:, some], named[folds == k], atol=1e-12)
 
 
 def test_of_functions_that_no_two_folds_share_those_that_hold_across_them_are_the_law(

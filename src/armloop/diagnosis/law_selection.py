@@ -26,9 +26,10 @@ from armloop.regression.sparse import Sparse
 from armloop.util.arrays import Array, Index
 from armloop.util.functions import NUMPY
 
-#: Most candidates of a library, and those that are tried: the order of its waves, and of how many angles one may be with
-#: speeds, and without: what pulls between two joints is a wave of both.
+#: Most candidates of a library, the order of waves of a joint's own angle, and the libraries that are tried: the order of
+#: their waves, and of how many angles one may be with speeds, and without: what pulls between two joints is a wave of both.
 _MOST_CANDIDATES = 1500
+_OWN_ORDER = 3
 _RICHEST_FIRST = ((3, None, 0), (3, 2, 0), (3, 1, 2), (2, 1, 2), (2, 1, 0))
 
 
@@ -91,10 +92,19 @@ def is_own(name: str, j: int) -> bool:
 
 
 def names_of(library: AngleSums, j: int) -> list[str]:
-    """Names of the functions of a law of a joint (0-based): the library's, those with its direction, its speed cubed."""
+    """Names of the functions of a law of a joint (0-based): the library's, those with its direction, its speed cubed.
+
+    Of a joint's own angle waves of three times a turn are among them, however few the library of an arm of many joints has.
+    """
     own = f"v{j + 1}"
+    more = [f"{wave}({k}*q{j + 1})" for k in _more_orders(library, j) for wave in ("cos", "sin")]
     signed = [f"{library.names[k]}*sign({own})".removeprefix("1*") for k in _directed(library, j)]
-    return [*library.names, *signed, f"{own}^3"]
+    return [*library.names, *more, *signed, *(f"{name}*sign({own})" for name in more), f"{own}^3"]
+
+
+def _more_orders(library: AngleSums, j: int) -> range:
+    """Orders of a joint's (0-based) own waves that a library lacks."""
+    return range(library.N1 + 1, _OWN_ORDER + 1) if library.revolute[j] else range(0)
 
 
 def _filtered(evidence: Evidence, j: int, names: Sequence[str]) -> Array:
@@ -128,7 +138,9 @@ class LawSelection:
         self.names = names_of(library, j)
         moving = evidence.samples.motion.take(np.flatnonzero(evidence.rows[:, j]))
         X, own = library.columns(moving), moving.v[:, [j]]
-        X = np.hstack([X, X[:, _directed(library, j)] * np.sign(own), own**3])
+        more = [f(k * moving.q[:, [j]]) for k in _more_orders(library, j) for f in (np.cos, np.sin)]
+        directed = [X[:, _directed(library, j)], *more]
+        X = np.hstack([X, *more, *(x * np.sign(own) for x in directed), own**3])
         self._folds = [self.rows.fold == k for k in range(FOLDS)]
         self._X = [X[fold] for fold in self._folds]
         self._parts = [Moments.of(X, self.y[fold]) for X, fold in zip(self._X, self._folds, strict=True)]
