@@ -76,6 +76,8 @@ def test_it_is_told_wherever_a_verdict_is(half_changed: Diagnosis, model: Recons
     assert answer["logs"] == ["run_1"] and [each["logs"] for each in answer["apart"]] == [["run_3"]]
     said = "and they were judged apart: all else here is said of run_1 (in run_3: no effect)"
     assert answer["reasons"][0] == f"the arm was not the same in all logs, or not at the same times, {said}"
+    again = half_changed.beside(half_changed.apart)
+    assert len(again.reasons) == 1 and again.reasons[0].endswith("(in run_3: no effect; in run_3: no effect)")
     assert "run_3, judged apart: no effect" in diagnosis_table(half_changed)
     page = diagnosis_report(half_changed, model)
     assert "run_3, judged apart: no effect" in page and "predicted the torque of run_1 (" in page

@@ -97,7 +97,7 @@ def diagnose(
                 f"{logs[0].name}: tau{j + 1} is zero throughout; give a log that holds the joint's torque"
             )
     found = _of_logs(model, logs, progress, jobs)
-    stand = replace(found.standing, reasons=[*found.reasons, *own_zeros])
+    stand = replace(found.standing, reasons=[*found.standing.reasons, *own_zeros])
     return replace(found, standing=stand, zeros=zeros)
 
 

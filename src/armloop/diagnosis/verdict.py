@@ -80,15 +80,14 @@ class Diagnosis:
         return replace(self, model=self.model.with_effects(added), adopted=True) if added else self
 
     def beside(self, others: Sequence[Diagnosis]) -> Diagnosis:
-        """The same with the verdicts on logs in which the arm was not the same, and a word of that."""
-        apart = (*others, *self.apart)
-        said = unlike(self.logs, [(each.logs, each.labels or [each.verdict]) for each in apart])
-        return replace(self, apart=apart, standing=replace(self.standing, reasons=[said, *self.reasons]))
+        """The same with the verdicts on logs in which the arm was not the same."""
+        return replace(self, apart=(*others, *self.apart))
 
     @property
     def reasons(self) -> list[str]:
         """What a reader must know before relying on the verdict."""
-        return self.standing.reasons
+        others = [(each.logs, each.labels or [each.verdict]) for each in self.apart]
+        return [*([unlike(self.logs, others)] if others else []), *self.standing.reasons]
 
     @property
     def named(self) -> list[tuple[str, int | None]]:
