@@ -175,7 +175,7 @@ LOGS: dict[str, tuple[Lay, str, str]] = {
         WARNED,
         r"column tau1 reaches .* N\*m, 134 times the effort limit of joint_1",
     ),
-    "torques beyond the limit": (scaled("tau", 9.0), TAKEN, ""),
+    "torques beyond the limit": (scaled("tau", 9.0), WARNED, r"tau1 is about .* times what the model gives"),
     "a torque of a coarse sensor": (signals(rounded), TAKEN, ""),
     "stamps that nearly coincide": (signals(stamped_late), WARNED, r"column time has rows nearer to another"),
     "torques in a unit of no arm": (parquet(b"lbf"), REFUSED, "says of itself that tau is in 'lbf'"),
