@@ -317,6 +317,11 @@ def test_an_event_within_two_errors_of_none_goes_and_is_told(monkeypatch: pytest
     assert made.reasons[0].startswith(said)
     vague.clear = 2.0
     assert judged().contacts == [CONTACT, vague] and answers.asked["found"]
+    # nor of a run in which nothing else is looked for
+    vague.clear = 1.9
+    Answers(monkeypatch, still=True, contacts=[CONTACT, vague])
+    made = judged()
+    assert made.contacts == [CONTACT] and made.reasons[0].startswith(said)
 
 
 def test_what_is_left_is_judged_where_joints_slide_and_what_is_found_at_reversals_is_not_asked(

@@ -20,7 +20,7 @@ from armloop.model import ReconstructedModel
 from armloop.reports.tables import score_table
 from armloop.reports.words import counted
 from armloop.robot.arm import Arm
-from armloop.robot.plausibility import say_beyond_limits, say_motionless
+from armloop.robot.plausibility import say_implausible
 from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import InputError
 from armloop.util.files import write_text
@@ -156,6 +156,5 @@ def samples_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> Samples
     """The logs conditioned as the model's training logs were; raises ``InputError`` where there is none."""
     found = logs_for(model, logs)
     require_some(found)
-    say_beyond_limits(model.arm, found)
-    say_motionless(model.arm, found)
+    say_implausible(model.arm, found)
     return preprocess(found, model.conditioning)

@@ -22,7 +22,7 @@ def run(options: Evaluate) -> None:
     from armloop.identification.scoring import score
     from armloop.reports.tables import ALL_COUNT, score_table
     from armloop.reports.words import wrapped
-    from armloop.robot.plausibility import say_beyond_limits, say_motionless
+    from armloop.robot.plausibility import say_implausible
     from armloop.util.doubts import warn
     from armloop.util.errors import InputError
 
@@ -31,8 +31,7 @@ def run(options: Evaluate) -> None:
     from armloop.identification.validation.misrecorded import misrecorded, turned_joints
 
     require_different(logs)
-    say_beyond_limits(model.arm, logs)
-    say_motionless(model.arm, logs)
+    say_implausible(model.arm, logs)
     samples = preprocess(logs, model.conditioning)
     if not samples.tau.any():
         raise InputError(

@@ -52,7 +52,7 @@ from armloop.diagnosis.zeros import sentences, settled
 from armloop.identification.validation.misrecorded import misrecorded
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import ReconstructedModel
-from armloop.robot.plausibility import say_beyond_limits, say_motionless
+from armloop.robot.plausibility import say_implausible
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import one_thread
@@ -82,8 +82,7 @@ def diagnose(
                 f"{log.name}: {log.joints} joints, but the model's arm {model.arm.name} has {model.arm.n}"
             )
     require_different(logs)
-    say_beyond_limits(model.arm, logs)
-    say_motionless(model.arm, logs)
+    say_implausible(model.arm, logs)
     progress("conditioning the run like the model's training logs")
     logs, zeros = settled(model, logs)
     own_zeros = sentences(model, [log.name for log in logs], zeros)
@@ -182,6 +181,8 @@ def _by_events_alone(whole: Evidence, contacts: list[Contact], untold: list[Cont
     Args:
         untold: what may be events, or a law.
     """
+    unclear = [each for each in contacts if each.clear < CHANCE]
+    contacts = [each for each in contacts if each not in unclear]
     evidence = without(whole, contacts)
     nothing = fit(evidence, evidence.residual([]), [], [])
     augmented = whole.model.with_effects([contact.added for contact in contacts])
@@ -196,6 +197,7 @@ def _by_events_alone(whole: Evidence, contacts: list[Contact], untold: list[Cont
     )
     stand = standing(evidence, augmented, found.errors()["after"], range(1, whole.model.arm.n + 1))
     doubted = [event_untold(contact.added) for contact in untold]
+    doubted += [event_unclear(each.added, each.clear) for each in unclear]
     return replace(found, standing=replace(stand, reasons=[*doubted, too_still(evidence), *stand.reasons]))
 
 

@@ -58,8 +58,7 @@ def is_contradicted(found: Diagnosis, model: ReconstructedModel, samples: Sample
     if any(not law.parameters for law in found.laws):
         return True
     plain, changed = (Evidence.of(each, samples, []) for each in (model, found.adopt().model))
-    rows = plain.rows & changed.rows
-    bare, trial = (Known.of(each.only(rows)).fit.score for each in (plain, changed))
+    bare, trial = (Known.of(each).fit.score for each in (plain, changed))
     return leaves_more(trial, bare, soaked(bare, bare))
 
 

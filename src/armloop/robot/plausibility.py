@@ -23,10 +23,10 @@ _TIMES = 10.0
 _SAME_MASS = 1e-6
 
 
-def say_beyond_limits(arm: Arm, logs: Sequence[MotionLog]) -> None:
-    """Say where logs cannot be an arm's, if its URDF is right."""
+def say_implausible(arm: Arm, logs: Sequence[MotionLog]) -> None:
+    """Say where logs cannot be an arm's, if its URDF is right, and which joints' positions are one number throughout."""
     for log in logs:
-        for sentence in beyond_limits(arm, log):
+        for sentence in (*beyond_limits(arm, log), *motionless(arm, log)):
             warn(f"{log.name}: {sentence}")
 
 
@@ -61,13 +61,6 @@ def require_made_for(made_for: Arm, arm: Arm, what: str) -> None:
                 f"model was made with, {other:.4g} kg in that of {arm.name}; the model goes by its own"
             )
             return
-
-
-def say_motionless(arm: Arm, logs: Sequence[MotionLog]) -> None:
-    """Say which joints' positions are one number throughout a log in which others move."""
-    for log in logs:
-        for sentence in motionless(arm, log):
-            warn(f"{log.name}: {sentence}")
 
 
 def motionless(arm: Arm, log: MotionLog) -> Iterator[str]:

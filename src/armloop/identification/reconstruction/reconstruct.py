@@ -48,7 +48,7 @@ from armloop.identification.uncertainty.between_logs import notes as between_log
 from armloop.model import ReconstructedModel
 from armloop.model.added_effect import ripples
 from armloop.robot.arm import Arm
-from armloop.robot.plausibility import say_beyond_limits
+from armloop.robot.plausibility import say_implausible
 from armloop.util.doubts import warn
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
@@ -176,7 +176,7 @@ def reconstruct(
     require_different(kept)
     if kept:
         check_recorded(arm, np.max([np.abs(log.tau).max(axis=0) for log in kept], axis=0))
-    say_beyond_limits(arm, kept)
+    say_implausible(arm, kept)
     if conditioning is not None:
         check_nyquist(kept or logs, conditioning.cutoff_hz)
         # samples that are no time series show the first library alone what it needs
