@@ -128,6 +128,7 @@ def test_a_log_is_compared_sample_by_sample_as_it_is_scored(model):
     N = len(seen.time)
     for each in (seen.q, seen.v, seen.vdot, seen.measured, seen.predicted, seen.residual, seen.moving):
         assert each.shape == (N, 3)
+    np.testing.assert_array_equal(seen.residual, seen.measured - seen.predicted)
     assert len(seen.starts) == 2 and repr(seen) == f"<armloop.Comparison of {N} samples of 3 joints, 2 runs>"
     squares = np.where(seen.moving, seen.residual**2, 0.0).sum(axis=0) / seen.moving.sum(axis=0)
     assert np.sqrt(squares) == pytest.approx(model.score(logs).rmse, rel=1e-9)

@@ -123,7 +123,7 @@ def confounded(diagnosis: Diagnosis) -> list[tuple[str, list[tuple[str, str]]]]:
         number = k - before + 1 if before <= k < before + len(diagnosis.contacts) else 0
         others = tuple((place(r), r["why"]) for r in found["alternatives"])
         if others:
-            alike.setdefault((place(found), others if number else k), []).append((number, found))
+            alike.setdefault((place(found), others), []).append((number, found))
     return [
         (
             place(each[0][1]) + _numbered([number for number, _ in each if number]),

@@ -32,11 +32,20 @@ def usual(log: Samples) -> Array:
 
 
 def found(
-    logs: Sequence[Samples], residuals: Sequence[Array], monkeypatch: pytest.MonkeyPatch
+    logs: Sequence[Samples],
+    residuals: Sequence[Array],
+    monkeypatch: pytest.MonkeyPatch,
+    slow: tuple[float, float] = (0.0, 0.0),
 ) -> list[Burst]:
+    """With joints that are slower than it is known of at some times, s."""
     left = {id(log): residual for log, residual in zip(logs, residuals, strict=True)}
     monkeypatch.setattr(outlying_stretch, "residual", lambda model, one: left[id(one)])
-    monkeypatch.setattr(outlying_stretch, "too_slow", lambda model, one: ~one.moving)
+
+    def too_slow(model: Any, one: Samples) -> np.ndarray:
+        time = one.motion.time
+        return np.broadcast_to(((time > slow[0]) & (time < slow[1]))[:, None], one.moving.shape)
+
+    monkeypatch.setattr(outlying_stretch, "too_slow", too_slow)
     model: Any = SimpleNamespace(arm=SimpleNamespace(n=2))
     return outlying_stretches(model, [("run", log) for log in logs])
 
@@ -76,6 +85,9 @@ def test_what_comes_back_is_no_outlier_nor_what_is_next_to_nothing(monkeypatch: 
     log = samples()
     twice = np.maximum(with_burst(log, 10.0, 10.5, 8.0), with_burst(log, 30.0, 30.5, 8.0))
     assert found([log], [twice], monkeypatch) == []
+    # nor what is half as large at another time
+    half = np.maximum(with_burst(log, 10.0, 10.5, 4.0), with_burst(log, 30.0, 30.5, 8.0))
+    assert found([log], [half], monkeypatch) == []
     # in another log, too
     assert found([log, samples()], [with_burst(log, 20.0, 20.5, 8.0)] * 2, monkeypatch) == []
     one = with_burst(log, 20.0, 20.5, 8.0)
@@ -83,9 +95,20 @@ def test_what_comes_back_is_no_outlier_nor_what_is_next_to_nothing(monkeypatch: 
     # nor where the joint does not slide, nor where too little is known of the rest, nor of samples that are no series
     resting = replace(log, moving=log.moving & (np.abs(log.motion.time - 20.0) > 1.0)[:, None])
     assert found([resting], [one], monkeypatch) == []
+    assert found([log], [one], monkeypatch, slow=(19.5, 21.0)) == []
     short = samples(14.0)
     assert found([short], [with_burst(short, 7.0, 7.5, 8.0)], monkeypatch) == []
     assert found([replace(log, cutoff_hz=0.0)], [one], monkeypatch) == found([], [], monkeypatch) == []
+
+
+def test_how_a_run_ends_hides_no_burst_within_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = samples()
+    left = with_burst(log, 20.0, 20.5, 8.0)
+    left[:30, 1] = 50.0
+    assert found([log], [left], monkeypatch) == []
+    monkeypatch.setattr(Samples, "at_an_end", property(lambda one: one.motion.time < 0.4))
+    (burst,) = found([log], [left], monkeypatch)
+    assert burst.peak == pytest.approx(8.0)
 
 
 def test_several_joints_at_one_time_are_one_line() -> None:

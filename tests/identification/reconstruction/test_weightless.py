@@ -12,7 +12,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 from armloop.data.log import MotionLog
 from armloop.identification.reconstruction.plain_fits import Fit
 from armloop.identification.reconstruction.torque_checks import check_torques
-from armloop.identification.reconstruction.weightless import times_lighter
+from armloop.identification.reconstruction.weightless import times_lighter, weight_alone
 from armloop.util.errors import InputWarning
 
 
@@ -64,6 +64,16 @@ def test_torques_that_hold_the_weight_alone_are_said_to_be(seed: int) -> None:
     moved = rigid_torque(arm, motion.q, motion.v, motion.vdot)
     for dry in (0.0, 0.1):
         assert not told(measured(motion, moved + dry * friction(motion.v), seed))
+
+
+def test_of_joints_that_carry_none_nothing_is_explained_either_way() -> None:
+    def fit(*relative: float) -> Fit:
+        return Fit(np.array(relative), np.ones(2), np.ones(2))
+
+    for still, alone in ((fit(1.0, 1.0), False), (fit(0.3, 1.0), True)):
+        given = SimpleNamespace(fit=lambda signs, order, still=still: still)
+        problem: Any = SimpleNamespace(arm=Arm(np.zeros(3)), of_weight_alone=lambda given=given: given)
+        assert weight_alone(problem, still) is alone
 
 
 @dataclass
