@@ -181,8 +181,6 @@ def _by_events_alone(whole: Evidence, contacts: list[Contact], untold: list[Cont
     Args:
         untold: what may be events, or a law.
     """
-    unclear = [each for each in contacts if each.clear < CHANCE]
-    contacts = [each for each in contacts if each not in unclear]
     evidence = without(whole, contacts)
     nothing = fit(evidence, evidence.residual([]), [], [])
     augmented = whole.model.with_effects([contact.added for contact in contacts])
@@ -197,7 +195,6 @@ def _by_events_alone(whole: Evidence, contacts: list[Contact], untold: list[Cont
     )
     stand = standing(evidence, augmented, found.errors()["after"], range(1, whole.model.arm.n + 1))
     doubted = [event_untold(contact.added) for contact in untold]
-    doubted += [event_unclear(each.added, each.clear) for each in unclear]
     return replace(found, standing=replace(stand, reasons=[*doubted, too_still(evidence), *stand.reasons]))
 
 
