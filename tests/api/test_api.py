@@ -217,6 +217,20 @@ def test_currents_and_torques_do_not_mix(model):
         model.score(MotionLog(log.time, log.q[:, :2], log.v[:, :2], log.tau[:, :2]))
 
 
+def test_a_score_says_what_is_wrong_with_a_log_as_the_command_does(model):
+    log = run(10, 6)
+    gains = [10.0, 20.0, 5.0]
+    currents = MotionLog(log.time, log.q, log.v, log.tau / gains, name="run")
+    of_currents = replace(model, recorded={"unit": "A", "drive_gains": gains})
+    for ask in (of_currents.score, of_currents.compare):
+        with pytest.warns(InputWarning, match="run: tau seems to be motor current"):
+            ask(currents)
+    with pytest.warns(InputWarning, match="run: tau2 has the other sign"):
+        al.evaluate(model, MotionLog(log.time, log.q, log.v, log.tau * [1, -1, 1], name="run"))
+    with pytest.raises(InputError, match="run: every tau is zero"):
+        model.score(MotionLog(log.time, log.q, log.v, 0 * log.tau, name="run"))
+
+
 def test_logs_are_read_by_pattern(tmp_path):
     for k in (2, 1):
         al.write_log(tmp_path / f"run_{k}.csv", run(5, k))

@@ -16,6 +16,7 @@ from armloop.data.motion import Samples
 from armloop.data.signals import preprocess
 from armloop.identification.scoring import Score as Numbers
 from armloop.identification.scoring import residual, score
+from armloop.identification.validation.misrecorded import say_misrecorded
 from armloop.model import ReconstructedModel
 from armloop.reports.tables import score_table
 from armloop.reports.words import counted
@@ -153,8 +154,14 @@ def logs_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> list[Motio
 
 
 def samples_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> Samples:
-    """The logs conditioned as the model's training logs were; raises ``InputError`` where there is none."""
+    """The logs conditioned as the model's training logs were, with warnings of gross errors of theirs.
+
+    Raises:
+        InputError: there is no log, one does not fit the model's arm or unit, or every torque is zero.
+    """
     found = logs_for(model, logs)
     require_some(found)
     say_implausible(model.arm, found)
-    return preprocess(found, model.conditioning)
+    samples = preprocess(found, model.conditioning)
+    say_misrecorded(model, samples, [log.name for log in found])
+    return samples

@@ -23,23 +23,15 @@ def run(options: Evaluate) -> None:
     from armloop.reports.tables import ALL_COUNT, score_table
     from armloop.reports.words import wrapped
     from armloop.robot.plausibility import say_implausible
-    from armloop.util.doubts import warn
-    from armloop.util.errors import InputError
 
     model, logs = model_and_logs(options)
     # here, for it needs what takes longer to import than a fault of the input to be told
-    from armloop.identification.validation.misrecorded import misrecorded, turned_joints
+    from armloop.identification.validation.misrecorded import say_misrecorded
 
     require_different(logs)
     say_implausible(model.arm, logs)
     samples = preprocess(logs, model.conditioning)
-    if not samples.tau.any():
-        raise InputError(
-            f"{logs[0].name}: every tau is zero throughout; give a log that holds the joints' torques"
-        )
-    whole = misrecorded(model, samples)
-    for wrong in [whole] if whole else turned_joints(model, samples):
-        warn(f"{', '.join(log.name for log in logs)}: {wrong}")
+    say_misrecorded(model, samples, [log.name for log in logs])
     result = score(model, samples)
     if options.json:
         print_json(result.to_dict())

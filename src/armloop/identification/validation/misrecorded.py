@@ -7,7 +7,7 @@ joints; a diagnosis would name whatever fits such a log least badly.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -22,6 +22,8 @@ from armloop.identification.scoring import residual, score_errors
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array
+from armloop.util.doubts import warn
+from armloop.util.errors import InputError
 
 #: A joint's relative error from which on a log is asked, and the part of each joint's, at most, that what it may mean must
 #: leave of it, but for what the model leaves on its own data as well: two columns that are exchanged leave others as good.
@@ -82,6 +84,24 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
         if _far_better(left, _relative(residual(model, other), other), _usual(model, other)):
             return words
     return ""
+
+
+def say_misrecorded(model: ReconstructedModel, samples: Samples, names: Sequence[str]) -> None:
+    """Warn of gross errors of the logs that samples are of, as a whole or else joint by joint.
+
+    Args:
+        samples, names: what the logs are preprocessed, as the model's training logs were, and the logs' names.
+
+    Raises:
+        InputError: every torque is zero.
+    """
+    if not samples.tau.any():
+        raise InputError(
+            f"{names[0]}: every tau is zero throughout; give a log that holds the joints' torques"
+        )
+    whole = misrecorded(model, samples)
+    for wrong in [whole] if whole else turned_joints(model, samples):
+        warn(f"{', '.join(names)}: {wrong}")
 
 
 def turned_joints(model: ReconstructedModel, samples: Samples) -> list[str]:
