@@ -186,6 +186,56 @@ def test_the_amplitude_is_what_the_drive_shows_below_the_corner_if_it_shows_less
         assert ripple._below(few_left, (order, x, covariance), 2.0)[0] is x
 
 
+def cogging(order: float, corner_hz: float, shown: float = 1.5, seed: int = 3) -> Residual:
+    """A joint that creeps here and there, and moves fast in between; its drive shows a motor's cogging to some corners."""
+    rng = np.random.default_rng(seed)
+    moves, q = [], 0.0
+    for k in range(60):
+        speed = rng.choice([-1, 1]) * (
+            1.2 if k % 3 == 0 else rng.uniform(0.3, 1.2) * 2 * np.pi * corner_hz / order
+        )
+        moves.append((q + speed * 0.01 * np.arange(100), np.full(100, speed)))
+        q = float(moves[-1][0][-1]) if abs(moves[-1][0][-1]) < 2 else 0.0
+    angle, v = (np.concatenate(x) for x in zip(*moves, strict=True))
+    seen = order * np.abs(v) < 2 * np.pi * corner_hz * shown
+    wave = 1.2 * np.sin(order * angle) + 1.6 * np.cos(order * angle)
+    left = np.where(seen, wave, 0.0) + rng.normal(size=len(v))
+    return Residual(angle, left, np.arange(len(v)) // 100, v)
+
+
+@pytest.mark.parametrize("order", [150.0, 320.0, 404.37, 808.0])
+def test_what_a_motor_does_is_found_where_the_joint_creeps(
+    order: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """2 N·m, of which the drive shows nothing while the joint moves fast: orders beyond those of the diagnosis, too."""
+    arm, corner = three_axis(), 8.0
+    other = Residual(*(np.zeros(0) for _ in range(4)))  # type: ignore[arg-type]
+    monkeypatch.setattr(ripple, "_residuals", lambda *_: ([cogging(order, corner), other, other], 0.01))
+    monkeypatch.setattr(ripple.TorqueRipple, "shapes", lambda self, context: [*range(4, 60)])
+    sampled: Any = SimpleNamespace(cutoff_hz=corner, motion=None)
+    nothing: Any = None
+    found = ripple.find_ripple(SimpleNamespace(arm=arm), [], sampled, nothing)  # type: ignore[arg-type]
+    (own,) = found
+    p = own.parameters
+    assert own.effect.joint == 1
+    assert p["order"].value == pytest.approx(order, abs=0.02)
+    assert p["amplitude"].value == pytest.approx(2.0, abs=4 * float(p["amplitude"].std_error))
+    assert float(p["amplitude"].std_error) < 0.15
+
+
+def test_samples_that_are_too_few_to_creep_tell_of_no_motor(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, asked = three_axis(), []
+    fast = cogging(404.0, 8.0)
+    fast = replace(fast, v=np.where(np.arange(len(fast.v)) < 499, 0.01, 1.5))
+    monkeypatch.setattr(ripple, "_residuals", lambda *_: ([fast] * 3, 0.01))
+    monkeypatch.setattr(ripple.TorqueRipple, "shapes", lambda self, context: [4])
+    monkeypatch.setattr(ripple, "_line", lambda left, orders, joints: asked.append(orders.tolist()))
+    sampled: Any = SimpleNamespace(cutoff_hz=8.0, motion=None)
+    nothing: Any = None
+    assert ripple.find_ripple(SimpleNamespace(arm=arm), [], sampled, nothing) == []  # type: ignore[arg-type]
+    assert asked == [[4]] * 3
+
+
 @pytest.mark.parametrize("samples", [499, 500])
 def test_joints_that_turn_are_asked_until_nothing_is_left_three_times_at_most(
     samples: int, monkeypatch: pytest.MonkeyPatch

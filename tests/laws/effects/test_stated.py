@@ -208,6 +208,28 @@ def test_a_springs_rest_is_within_a_turn_or_two_metres() -> None:
     assert possible(3, -1.99) and not possible(3, 2.01)
 
 
+@pytest.mark.parametrize(("periods", "shown"), [(0.1, 1.0), (0.3, 1.0), (0.45, 0.5), (0.6, 0.0), (1.0, 0.0)])
+def test_samples_show_nothing_of_a_ripple_that_passes_between_two_of_them(
+    periods: float, shown: float
+) -> None:
+    """One that passes once per sample would be a constant torque, which no low-pass takes away."""
+    time = 0.02 + 0.01 * np.arange(50)
+    v = np.tile([2 * np.pi * periods / 0.01 / 200, 0.0, 0.0, 0.0], (50, 1))
+    motion = Motion(time, v * time[:, None], v, 0 * v)
+    values = {"amplitude": 2.0, "order": 200.0, "phase": 0.3}
+    torque = effect("torque_ripple", 1).torque(Context(SCARA, motion), values)
+    np.testing.assert_allclose(torque[:, 0], 2 * shown * np.sin(200 * motion.q[:, 0] + 0.3), atol=1e-9)
+    columns = effect("torque_ripple", 1).columns(Context(SCARA, motion), 200.0)
+    np.testing.assert_allclose(columns[:, 0], shown * np.sin(200 * motion.q[:, 0]), atol=1e-9)
+    # states that do not follow one another are as they are, and one by itself
+    order = np.random.default_rng(1).permutation(50)
+    mixed = Motion(time, motion.q[order], motion.v[order], motion.vdot)
+    some = effect("torque_ripple", 1).torque(Context(SCARA, mixed), values)
+    np.testing.assert_allclose(some[:, 0], 2 * np.sin(200 * mixed.q[:, 0] + 0.3), atol=1e-9)
+    alone = effect("torque_ripple", 1).torque(Context(SCARA, motion.take(slice(5, 6))), values)
+    np.testing.assert_allclose(alone[:, 0], 2 * np.sin(200 * motion.q[5:6, 0] + 0.3), atol=1e-9)
+
+
 def test_a_ripple_is_sought_up_to_a_fifth_of_the_sample_rate_of_joints_that_turn() -> None:
     def orders(joint: int, speed: float, period: float) -> list[float]:
         motion = Motion(np.arange(9.0), *np.zeros((3, 9, SCARA.n)), np.array([0]))

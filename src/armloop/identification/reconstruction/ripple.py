@@ -9,6 +9,10 @@ up, so it is one of the laws that are fitted beside them (:mod:`reconstruction.c
 Beyond the corner the ripple shakes the links, whose inertia takes up a part of it that the model's motion does not show: the
 drive shows the rest. Where what it shows below the corner differs, that is the amplitude (Hausman's test: of two estimates
 the one that is consistent, if they differ by more than it errs).
+
+Motors cog several times per turn, which behind a gear of one to a hundred is four or eight hundred times per revolution of
+the joint: the drive shows that only while the joint creeps. So higher orders are looked for, octave by octave, in samples
+so slow that the octave's lowest passes below the corner.
 """
 
 from __future__ import annotations
@@ -38,6 +42,8 @@ _WORTH = 0.005
 _FEWEST = 500
 #: … in so many blocks at least, where an amplitude is of some of the samples.
 _BLOCKS = 10
+#: Highest orders of the octaves that are looked for in slow samples.
+_OCTAVES = (240, 480, 960)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +58,14 @@ class Residual:
     def only(self, rows: Mask) -> Residual:
         """The same of some of the samples."""
         return Residual(self.q[rows], self.left[rows], self.block[rows], self.v[rows])
+
+    def below(self, order: float, corner_hz: float) -> Residual:
+        """The same of the samples at which a ripple of an order lies below a corner."""
+        return self.only(order * np.abs(self.v) <= 2 * np.pi * corner_hz)
+
+    def tells(self) -> bool:
+        """Whether it is of samples enough to tell an amplitude."""
+        return len(self.q) >= _FEWEST and len(np.unique(self.block)) >= _BLOCKS
 
 
 def find_ripple(
@@ -70,19 +84,33 @@ def find_ripple(
     for j, joint in enumerate(model.arm.joints):
         if joint.kind != "revolute" or len(residuals[j].q) < _FEWEST:
             continue
-        left = residuals[j]
-        effect = TorqueRipple(j + 1)
-        orders = np.array(effect.shapes(Context(model.arm, samples.motion, period=period)))
-        for _ in range(MOST):
-            line = _line(left, orders, model.arm.n)
-            if line is None:
+        orders = TorqueRipple(j + 1).shapes(Context(model.arm, samples.motion, period=period))
+        own, left = _lines(model, j, residuals[j], np.array(orders), samples.cutoff_hz)
+        found += own
+        for top in _OCTAVES:
+            slow = left.below(top // 2, samples.cutoff_hz)
+            if not slow.tells():
                 break
-            order, x, _ = line
-            stated = effect.estimates(model.arm, *_below(left, line, samples.cutoff_hz), order)
-            found.append(AddedEffect(effect, stated, "always"))
-            # what is taken off is what the drive shows of it at all speeds, else the rest would be a line again
-            left = replace(left, left=left.left - waves(left.q, order) @ x[:2])
+            higher, _ = _lines(model, j, slow, np.arange(top // 2 + 1.0, top + 1.0), samples.cutoff_hz)
+            found += higher
     return found
+
+
+def _lines(
+    model: ReconstructedModel, joint: int, left: Residual, orders: Array, corner_hz: float
+) -> tuple[list[AddedEffect], Residual]:
+    """The ripples of a joint (0-based) that have one of the orders, and what they leave."""
+    effect, found = TorqueRipple(joint + 1), []
+    for _ in range(MOST):
+        line = _line(left, orders, model.arm.n)
+        if line is None:
+            break
+        order, x, _ = line
+        stated = effect.estimates(model.arm, *_below(left, line, corner_hz), order)
+        found.append(AddedEffect(effect, stated, "always"))
+        # what is taken off is what the drive shows of it at all speeds, else the rest would be a line again
+        left = replace(left, left=left.left - waves(left.q, order) @ x[:2])
+    return found, left
 
 
 def notes(effects: Sequence[AddedEffect]) -> list[str]:
@@ -122,9 +150,9 @@ def _coefficients(left: Residual, order: float, moved: bool) -> tuple[Array, Arr
 def _below(left: Residual, line: tuple[float, Array, Array], corner_hz: float) -> tuple[Array, Array]:
     """A line's coefficients and covariance, or those below the corner where they differ and enough was recorded there."""
     order, x, covariance = line
-    slow = left.only(order * np.abs(left.v) <= 2 * np.pi * corner_hz)
+    slow = left.below(order, corner_hz)
     blocks = len(np.unique(slow.block))
-    if len(slow.q) < _FEWEST or blocks < _BLOCKS:
+    if not slow.tells():
         return x, covariance
     own, spread = _coefficients(slow, order, len(x) > 2)
     apart = (own - x)[:2]

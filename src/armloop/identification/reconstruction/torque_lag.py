@@ -4,9 +4,9 @@ Controllers record what they command, or what a drive reports some cycles later,
 What of it looks like friction and inertia goes into those, until friction drives and M(q) is not positive definite. Here
 the torques are regressed on rigid bodies and friction with memory beside their rates, each joint with a lag of its own
 (Gauss-Newton steps). A record has one lag, a law that the regression lacks another at every joint: the lag is taken where
-the joints agree, as the mean of effects that differ by more than their standard errors say (DerSimonian and Laird,
-Controlled Clinical Trials 7, 1986; Hartung and Knapp, Statistics in Medicine 20, 2001). The blocks that judge the model in
-the end take no part.
+the joints agree, by the Bayes factor of a mean of effects that differ by more than their standard errors say, with heavy
+tails, for one joint in six may lack much (Baker and Jackson, Statistical Methods in Medical Research 17, 2008). The blocks
+that judge the model in the end take no part.
 
 A stiff controller answers to the noise of a coarse encoder, which then is in the torque as well as in the columns, and least
 squares take what it makes of one for a lag, or hide one. The same columns of a smoother motion, in which that noise is not,
@@ -24,6 +24,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 from scipy.stats import t as student
 
 from armloop.data.blocks import block_numbers, block_sums, stretch
@@ -55,16 +56,18 @@ from armloop.laws.friction import FrictionTerm
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Index, Mask
 
-#: Chance of a lag where there is none, Gauss-Newton steps, and fewest samples of a joint.
-_CHANCE, _ROUNDS, _FEWEST = 0.01, 4, 200
+#: Odds of a lag against none, Gauss-Newton steps, and fewest samples of a joint.
+_ODDS, _ROUNDS, _FEWEST = 20.0, 4, 200
+#: Lags that are asked of, s; what one is expected to be, one standard deviation; and by how much what the regression lacks
+#: moves those of the joints apart: scales of Student's t of so many degrees of freedom.
+_LAGS, _EXPECTED = np.arange(-2000, 2001) * 5e-5, 0.02
+_APART, _TAILS = np.geomspace(1e-4, 5e-3, 9), 3.0
 #: At two corners it differs by no more standard errors, or by less than this part of it.
 _SURE, _ALIKE = 3.0, 0.5
+#: Instruments contradict least squares by more of theirs.
+_CONTRADICTED = 2.0
 #: The lower of the two corners, and that of the motion of which instruments are made, are so much lower.
 _SLOWER = 2.0
-#: No record is out of step by more, s.
-_LONGEST = 0.1
-#: What is known as well, s, is known exactly.
-_EXACT = 1e-9
 #: Laws whose torque, where a joint turns round, would else be a lag: dry friction that falls with the speed leads.
 _FRICTION = (*FRICTION, *(FrictionTerm("stribeck", parameter=speed) for speed in (0.03, 0.1, 0.3)))
 
@@ -102,17 +105,18 @@ class TorqueLag:
         seconds: what is taken; 0 where nothing is clear.
         std_error: of the mean over the joints, s.
         joints: (n,) each joint's own, s; NaN where it tells nothing.
+        log_odds: of one of all joints against none.
     """
 
     seconds: float
     std_error: float
     joints: Array
+    log_odds: float = -np.inf
 
     @property
     def clear(self) -> bool:
-        """Whether it is one of all joints, by Student's t of as many degrees of freedom as they leave."""
-        free = len(self.joints) - 1
-        return free > 0 and abs(self.seconds) > float(student.ppf(1 - _CHANCE / 2, free)) * self.std_error
+        """Whether it is one of all joints."""
+        return self.log_odds > np.log(_ODDS)
 
     def to_dict(self) -> dict[str, Any]:
         """What a model keeps of it."""
@@ -202,7 +206,7 @@ def _found(
     if not parts or (sum(part.rows.sum(axis=1) for part in parts) < _FEWEST).any():
         return TorqueLag(0.0, np.inf, np.full(arm.n, np.nan))
     plain, by_instruments = (_own(parts, instruments) for instruments in (False, True))
-    contradicted = abs(by_instruments.seconds - plain.seconds) > _SURE * by_instruments.std_error
+    contradicted = abs(by_instruments.seconds - plain.seconds) > _CONTRADICTED * by_instruments.std_error
     return by_instruments if contradicted else plain
 
 
@@ -265,7 +269,7 @@ def _own(parts: Sequence[_Part], instruments: bool) -> TorqueLag:
     found = TorqueLag(0.0, np.inf, np.zeros(0))
     size = _sizes(np.concatenate([part.torque(0.0)[:, 0] for part in parts]), joint)
     for _ in range(_ROUNDS):
-        lag = float(np.clip(found.seconds, -_LONGEST, _LONGEST))
+        lag = found.seconds
         tau, rate = np.concatenate([part.torque(lag) for part in parts]).T / size[joint]
         unit = size[joint, None]
         A = seen = np.hstack([X / unit, of_joint * rate[:, None]])
@@ -285,7 +289,8 @@ def _own(parts: Sequence[_Part], instruments: bool) -> TorqueLag:
         scores = np.stack([block_sums(column * left, block) for column in rates.T])
         lags, errors = lag + steps, np.sqrt(np.diag(inverse @ scores @ scores.T @ inverse))
         size = np.maximum(size * _sizes(before, joint), LEAST)
-        found = TorqueLag(*_mean(lags, errors), lags)
+        mean, error, odds = _mean(lags, errors)
+        found = TorqueLag(mean, error, lags, odds)
     return found
 
 
@@ -294,13 +299,16 @@ def _sizes(x: Array, joint: Index) -> Array:
     return np.sqrt(np.maximum(np.bincount(joint, x**2) / np.bincount(joint), LEAST**2))
 
 
-def _mean(lags: Array, errors: Array) -> tuple[float, float]:
-    """Mean of the joints' lags, which differ by more than their errors say, and its standard error."""
-    variance = np.maximum(errors, _EXACT) ** 2
-    weight, more = 1 / variance, len(lags) - 1
-    excess = float(weight @ (lags - weight @ lags / weight.sum()) ** 2) - more
-    between = max(excess, 0.0) / max(float(weight.sum() - weight @ weight / weight.sum()), TINY)
-    weight = 1 / (variance + between)
-    mean = float(weight @ lags / weight.sum())
-    spread = float(weight @ (lags - mean) ** 2) / max(more, 1)
-    return mean, float(np.sqrt(max(spread, 1.0) / weight.sum()))
+def _mean(lags: Array, errors: Array) -> tuple[float, float, float]:
+    """Mean of the joints' lags, which differ by more than their errors say, its standard error, and the log odds of one.
+
+    Lags and what moves those of the joints apart are summed over grids.
+    """
+    scale = np.hypot(_APART[:, None], errors)
+    likely = student.logpdf((lags - _LAGS[:, None, None]) / scale, _TAILS) - np.log(scale)
+    each = likely.sum(axis=2)
+    of_lag = np.exp(each - each.max()).mean(axis=1)
+    weight = of_lag * norm.pdf(_LAGS, scale=_EXPECTED)
+    mean = float(weight @ _LAGS / weight.sum())
+    odds = np.log(weight.sum() * (_LAGS[1] - _LAGS[0])) - np.log(max(of_lag[len(_LAGS) // 2], TINY))
+    return mean, float(np.sqrt(weight @ (_LAGS - mean) ** 2 / weight.sum())), float(odds)

@@ -50,6 +50,8 @@ _CHANCE = 0.001
 #: UR10e tell; those of a UR5 tell three to five times as much. It counts as much as so many logs that differ from another.
 USUAL, _WORTH = (0.005, 0.011), 2.0
 _ITERATIONS = 200
+#: Degrees of freedom, at most, of the distribution of logs: its tails are heavy, however many logs tell its variance.
+_TAILS = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,14 +229,14 @@ def friction_spread(model: ReconstructedModel, samples: Samples) -> Array:
     """(N, n, 2) torque of two independent errors of friction, one standard deviation between logs each.
 
     Through the samples' filter. The drives of an arm warm up together: it is one error that all joints share, each in its
-    direction in which friction grows. What few logs tell of a variance is less than it may be: three of these standard
-    deviations are exceeded as rarely as three of a normal variable (Student's t).
+    direction in which friction grows. What few logs tell of a variance is less than it may be, and a cold morning is none of
+    many alike: three of these standard deviations are exceeded as rarely as three of a normal variable (Student's t).
     """
     v = samples.motion.v
     torque = np.zeros((*v.shape, 2))
     kept = model.uncertainty.get("between_logs") or []
     known = model.uncertainty.get("between_logs_known", "different") != "assumed"
-    wider = _wider(model.uncertainty.get("between_logs_freedom") or np.inf) if known else 1.0
+    wider = _wider(min(model.uncertainty.get("between_logs_freedom") or np.inf, _TAILS)) if known else 1.0
     columns = smooth(samples, np.stack([np.sign(v), v], axis=2)) if any(kept) else torque
     for j, T in enumerate(kept):
         if T is not None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from armloop.data.motion import Motion
 from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Value, number
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
@@ -34,11 +35,32 @@ class TorqueRipple(Law):
     lowest_order = 4
     #: Above this part of the sample rate a ripple has been filtered away.
     band = 0.2
+    #: Periods between two samples up to which a ripple is as it is, and from which on samples show nothing of it: in between
+    #: it would be there as one of another frequency, which no low-pass takes away.
+    sampled = 0.3, 0.6
+    #: Samples follow one another if they lie no farther from where their speed leads, in parts of the way.
+    follow = 0.2
     #: Orders that differ by 2π over the travel are one; between whole ones it is sought in such parts of that.
     part = 0.05
 
     def coefficients(self, p: Mapping[str, float]) -> tuple[float, ...]:
         return p["amplitude"] * float(np.cos(p["phase"])), p["amplitude"] * float(np.sin(p["phase"]))
+
+    def values(self, context: Context, shape: float) -> list[Array]:
+        """Sine and cosine, but where samples follow one another too far apart for them."""
+        shown = self._shown(context.motion, shape)
+        return [shown * column for column in super().values(context, shape)]
+
+    def _shown(self, motion: Motion, order: float) -> Array | float:
+        """(N,) the part of a ripple that samples show of it; states that do not follow one another are as they are."""
+        if motion.samples < 2:
+            return 1.0
+        steps = motion.v[:, self.index] * motion.period
+        apart = np.abs(np.gradient(motion.q[:, self.index]) - steps)
+        if apart.sum() > self.follow * np.abs(steps).sum():
+            return 1.0
+        periods, (whole, none) = order * np.abs(steps) / (2 * np.pi), self.sampled
+        return np.clip((none - periods) / (none - whole), 0.0, 1.0)
 
     def columns(self, context: Context, shape: float) -> Array:
         """Sine and cosine; of an order that is none of teeth also what a small change of it does to either."""
