@@ -97,11 +97,13 @@ class Account:
         Args:
             first: what the search found.
         """
-        evidence = self.evidence
-        j = self._least_explained() if self.unlisted is None else self.unlisted.joint - 1
+        evidence, left = self.evidence, self.outcome.after.score
+        # of a law its joint, else the one of which most is left, in baselines
+        most = int(np.argmax(left.energy / np.maximum(left.rows, 1)))
+        j = most if self.unlisted is None else self.unlisted.joint - 1
         elsewhere = without_effects_at(evidence, first, j).found
         there = [f.effect for f in first.found if f not in elsewhere]
-        if not there or (self.unlisted is None and not much_is_left(self.outcome.after.score)[j]):
+        if not there or (self.unlisted is None and not much_is_left(left)[j]):
             return self
         progress(f"joint {j + 1}: whether other listed effects do better than {there[0].label()}")
         again = search(evidence, progress, panel, barred=[there[0].place])
@@ -114,11 +116,6 @@ class Account:
             return other if lead(others, mine) <= CHANCE else self
         least = MOSTLY * float(mine.excess.sum())
         return other if gain(mine, others) >= least and lead(mine, others) > SIGNIFICANCE else self
-
-    def _least_explained(self) -> int:
-        """The joint (0-based) of which most is left, in baselines."""
-        score = self.outcome.after.score
-        return int(np.argmax(score.energy / np.maximum(score.rows, 1)))
 
     def remaining(self) -> Array:
         """(N, n) residual of the model with effects and law, N·m (N); the law is tried beyond its range, too."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -122,11 +121,12 @@ class ChangePoints:
         self._weight = evidence.rows[self._kept] / evidence.scale
         self._y = evidence.residual([])[self._kept] * self._weight
         self._blocks = evidence.blocks[self._kept]
+        self._made: dict[tuple[object, ...], Gates] = {}
 
     def parts(self, effect: Effect, shape: Shape, others: tuple[Shaped, ...]) -> Iterator[Part]:
         """Every part of the run that begins, or ends, within one log."""
-        logs = _logs(self._motion)
-        for log in logs:
+        logs = {log.start: log for log in (log_of(self._motion, run) for run in self._motion.runs())}
+        for log in logs.values():
             for until in (False, True):
                 for elsewhere in (False, True) if len(logs) > 1 else (False,):
                     yield Part(effect, shape, others, log, until, elsewhere)
@@ -269,10 +269,6 @@ class ChangePoints:
             self._made[key] = Gates(self._columns(part.effect, part.shape), others, self._y)
         return self._made[key]
 
-    @cached_property
-    def _made(self) -> dict[tuple[object, ...], Gates]:
-        return {}
-
     def _columns(self, effect: Effect, shape: Shape) -> Array:
         return self.evidence.columns(effect, shape.final) * self._weight[:, :, None]
 
@@ -292,12 +288,6 @@ class ChangePoints:
 
 #: An instant that stands for any.
 _SOME = Onset(0.0, 0.0, False, ())
-
-
-def _logs(motion: Motion) -> list[slice]:
-    """Samples of each log of a motion."""
-    found = {(log.start, log.stop): log for log in (log_of(motion, run) for run in motion.runs())}
-    return list(found.values())
 
 
 def _middle(cuts: Index, likely: Array) -> int:

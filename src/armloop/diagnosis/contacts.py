@@ -140,9 +140,11 @@ def _one_or_each(
         if torque is None:
             return [one] if one else []
         each.append(replace(torque, shown=burst.joints))
-    if one and _apart(evidence, one, each) <= _together_explain(one) * _energy(evidence, one):
-        return [one]
-    return each
+    if one is None:
+        return each
+    # it, or a force that does as well
+    most = max([one.share, *(share for rival, share in one.rivals if rival.joint is None)])
+    return [one] if _apart(evidence, one, each) <= most * _energy(evidence, one) else each
 
 
 def _apart(evidence: Evidence, one: Contact, each: Sequence[Contact]) -> float:
@@ -152,11 +154,6 @@ def _apart(evidence: Evidence, one: Contact, each: Sequence[Contact]) -> float:
         (torque.share - (FREEDOM if torque.added.effect.joint != own else 0.0)) * _energy(evidence, torque)
         for torque in each
     )
-
-
-def _together_explain(one: Contact) -> float:
-    """Largest share of what a burst's joints leave that one event explains: it, or a force that does as well."""
-    return max([one.share, *(share for rival, share in one.rivals if rival.joint is None)])
 
 
 def _quiet(evidence: Evidence, residual: Array, tells: Mask, joints: frozenset[int]) -> Mask:

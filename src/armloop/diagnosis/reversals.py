@@ -312,17 +312,14 @@ class _Gains:
         """The largest part of the squared error at a joint's (0-based) reversals that an effect removes."""
         return max((own[j].share for own in self.by_effect.values() if j in own), default=0.0)
 
-    def _least(self, effect: Effect) -> float:
-        return MOSTLY if effect.name in self.found else PLAIN
-
     def best(self) -> Found | None:
         """The effect that removes most at some joint, the simplest of equals; None if none is worth naming."""
-        shares = {
-            effect: {
-                j: g.share for j, g in own.items() if g.share >= self._least(effect) and self._sure(effect, j)
+        shares = {}
+        for effect, own in self.by_effect.items():
+            least = MOSTLY if effect.name in self.found else PLAIN
+            shares[effect] = {
+                j: g.share for j, g in own.items() if g.share >= least and self._sure(effect, j)
             }
-            for effect, own in self.by_effect.items()
-        }
         most = [(share, j) for own in shares.values() for j, share in own.items()]
         if not most:
             return None

@@ -133,6 +133,8 @@ class Diagnosis:
         )
         for law in self.laws if self.adopted else []:
             after[law.joint - 1] = law.rmse_with_form
+        turned = self.reversals
+        at = {} if turned is None else {"before": turned.before.tolist(), "after": turned.after.tolist()}
         return {
             "metric": "rmse",
             "held_out": True,
@@ -141,14 +143,8 @@ class Diagnosis:
             "after": after.tolist(),
             "noise_floor": scale.tolist(),
             "nrmse": {"before": ratio(before, tau).tolist(), "after": ratio(after, tau).tolist()},
-            **self._at_reversals(),
+            **({"reversals": at} if at else {}),
         }
-
-    def _at_reversals(self) -> dict[str, Any]:
-        turned = self.reversals
-        if turned is None:
-            return {}
-        return {"reversals": {"before": turned.before.tolist(), "after": turned.after.tolist()}}
 
     def _only_at_reversals(self, found: Found) -> bool:
         return self.reversals is not None and found in self.reversals.found
