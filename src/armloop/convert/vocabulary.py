@@ -35,10 +35,6 @@ WORDS = {
         "时间戳", "时间", "時間", "时刻", "時刻", "시간", "время",
     ),
 }  # fmt: skip
-#: Words of `WORDS` that mean a motor current.
-CURRENT = {
-    "current", "currents", "amps", "i", "strom", "corriente", "courant", "corrente", "电流", "電流", "전류", "ток",
-}  # fmt: skip
 #: A name with one of these is not what was measured at the joint.
 WANTED = {
     "target", "desired", "des", "cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "goal", "action",

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armloop.data.log import MotionLog, read_log
+from armloop.data.log import MotionLog
 from armloop.data.pieces import log_sources
 from armloop.data.tables import CSV, PARQUET, kind_of, read_columns, read_header
 from armloop.model import ReconstructedModel
@@ -174,28 +174,21 @@ def _words(path: Path, name: str) -> list[str]:
     return [str(value) for value in column.unique().to_pylist()[:2]]
 
 
-def read_recording(file: LogFile, model: ReconstructedModel) -> Recording:
-    """Read a log as the model's training logs were recorded, with temperature and time since start where it has them.
+def recordings(file: LogFile, model: ReconstructedModel) -> Iterator[Recording]:
+    """A log as the model's training logs were recorded, with temperature and time since start where it has them.
+
+    Piece by piece, where it is too long to lie in memory (out-of-core).
 
     Raises:
         LogError: it is not a log of the model's arm.
     """
-    recorded = model.recorded
-    log = read_log(
-        file.path, joints=model.arm.n, tau_unit=recorded["unit"], drive_gains=recorded["drive_gains"]
-    )
-    return Recording(log, _extra(file.path, model.arm.n), recorded_at(file, float(log.time[0])))
-
-
-def recordings(file: LogFile, model: ReconstructedModel) -> Iterator[Recording]:
-    """The same piece by piece, where a log is too long to lie in memory (out-of-core)."""
     for piece in log_sources([file.path], model.arm.n, model.recorded):
         log = piece.read()
         extra = _extra(file.path, model.arm.n, piece.rows)
         yield Recording(log, extra, recorded_at(file, float(log.time[0])))
 
 
-def _extra(path: Path, n: int, rows: tuple[int, int] | None = None) -> dict[str, Array]:
+def _extra(path: Path, n: int, rows: tuple[int, int] | None) -> dict[str, Array]:
     header = read_header(path)
     extra: dict[str, Array] = {}
     numbered = [f"temperature{j}" for j in range(1, n + 1)]
