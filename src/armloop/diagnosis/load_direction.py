@@ -29,11 +29,8 @@ def pulls_down(known: Known, carried: Mask) -> bool:
         carried: (N,) samples in which it is there.
     """
     evidence, rows, mass = known.evidence, known.fit.stacked, known.fit.parameters[0]
-    arm, q, g = (
-        evidence.model.arm,
-        evidence.samples.motion.q,
-        float(np.linalg.norm(evidence.model.arm.gravity)),
-    )
+    arm, q = evidence.model.arm, evidence.samples.motion.q
+    g = float(np.linalg.norm(arm.gravity))
     level = np.linalg.svd(arm.gravity[None] / max(g, TINY))[2][1:]
     torque = (
         np.einsum("hx,nxj->njh", level, tool_jacobian(arm.with_tool_at(mass["com"].value), q))

@@ -256,13 +256,10 @@ class _View:
         gain = float(before.sum() - after.sum())
         least = max(self.noticeable[j], TINY)
         sums = [block_sums(x + least, self.block[mine]) for x in (before, after)]
-        noticed, always = (
-            gain >= self.noticeable[j] * mine.sum(),
-            MOSTLY * gain <= self.usual[j] * mine.sum(),
-        )
-        share = gain / float(before.sum()) if noticed else 0.0
-        news = gain / max(self.usual[j] * mine.sum(), TINY)
-        return _Gain(share, np.log(sums[0] / sums[1]), bool(always), news)
+        noticeable, usual = (x * mine.sum() for x in (self.noticeable[j], self.usual[j]))
+        share = gain / float(before.sum()) if gain >= noticeable else 0.0
+        always, news = bool(MOSTLY * gain <= usual), gain / max(usual, TINY)
+        return _Gain(share, np.log(sums[0] / sums[1]), always, news)
 
 
 @dataclass(frozen=True, eq=False)
