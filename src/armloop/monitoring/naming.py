@@ -117,10 +117,12 @@ def name_change(arm: Arm, given: Sequence[Column], healthy: Normal | None, windo
         gains.append(gain[pick])
         last = held[pick]
     whole = sum(gains)
-    return [
-        _named(arm, columns, rest, chosen, place, gain / whole if whole > 0 else 0.0, others)
-        for place, gain, others in zip(chosen, gains, alike, strict=True)
-    ]
+    found = []
+    for place, gained, others in zip(chosen, gains, alike, strict=True):
+        effect, parameters = _estimates(arm, columns, rest, chosen, place)
+        share = gained / whole if whole > 0 else 0.0
+        found.append(Named(place, parameters, share, effect.sentence(parameters), others))
+    return found
 
 
 def usual(healthy: Normal) -> Array:
@@ -238,16 +240,3 @@ def later_part(since: int, last: int) -> range:
     When the change began is an estimate, and a healthy unit among few would spoil the parameters.
     """
     return range(since + (last - since + 1) // 3, last + 1)
-
-
-def _named(
-    arm: Arm,
-    columns: Sequence[Column],
-    rest: Normal,
-    chosen: Sequence[Place],
-    place: Place,
-    share: float,
-    others: tuple[Place, ...],
-) -> Named:
-    effect, parameters = _estimates(arm, columns, rest, chosen, place)
-    return Named(place, parameters, share, effect.sentence(parameters), others)

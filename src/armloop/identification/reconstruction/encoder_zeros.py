@@ -184,7 +184,10 @@ class _Mixed:
     def left_out(self, kind: str) -> Array:
         """(N, n) what is left on every other block by what was regressed on the others, both ways round."""
         if kind == "springs":
-            columns = np.concatenate([self.table.columns, *_springs(self.table.motion.q)], axis=2)
+            q = self.table.motion.q
+            # K q − c, of springs of the joints and between any two of them
+            each = [spring_columns(q), np.broadcast_to(np.eye(q.shape[1]), (*q.shape, q.shape[1]))]
+            columns = np.concatenate([self.table.columns, *each], axis=2)
             return replace(self, table=replace(self.table, columns=columns)).left_out("")
         left = np.zeros_like(self.table.tau)
         odd = (self.table.blocks % 2).astype(bool)
@@ -240,8 +243,3 @@ class _Mixed:
             return np.broadcast_to(np.eye(n), (len(self.table.tau), n, n))
         p = self.slopes.shape[3]
         return np.moveaxis(self.slopes @ theta[:p], 0, 2)
-
-
-def _springs(q: Array) -> tuple[Array, Array]:
-    """Torques of springs of the joints, and between any two of them, at positions q (N, n), and constants: K q − c."""
-    return spring_columns(q), np.broadcast_to(np.eye(q.shape[1]), (*q.shape, q.shape[1]))

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from armloop.data.motion import Samples
 from armloop.data.pieces import IN_MEMORY, LogSource
 from armloop.data.repeats import require_different
 from armloop.data.signals import FELT, Conditioning
@@ -278,6 +277,8 @@ def _finished(
     tried = _chosen(libraries)
     found, data, compared = tried.found, tried.data, len(libraries) > 1
     notes = [*(comparison_notes(libraries) if compared else []), *found.notes, *ready.blocks.notes()]
+    # what dead zones went by, by which a later log's reversals are told from rest
+    noise = data.reference.samples.velocity_noise
     model = found.model(
         conditioning=tried.conditioning,
         recorded=recorded or {"unit": "N*m", "drive_gains": None},
@@ -288,7 +289,7 @@ def _finished(
             "steps": [report.to_dict() for report in found.reports],
             "range": motion_range(data.reference.samples.motion),
             "slowest": slowest_sliding(data.reference.samples),
-            **_velocity_noise(data.reference.samples),
+            **({} if noise is None else {"velocity_noise": noise.tolist()}),
             **found.history,
         },
     )
@@ -325,11 +326,6 @@ def _finished(
         notes += between_logs_notes(model)
         model = replace(model, history={**model.history, "notes": notes})
     return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
-
-
-def _velocity_noise(samples: Samples) -> dict[str, list[float]]:
-    """What the dead zones of the training logs went by, by which a later log's reversals are told from rest."""
-    return {} if samples.velocity_noise is None else {"velocity_noise": samples.velocity_noise.tolist()}
 
 
 def _find_ripple(tried: Attempt, logs: Sequence[LogSource]) -> None:

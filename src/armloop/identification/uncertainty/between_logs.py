@@ -236,7 +236,8 @@ def friction_spread(model: ReconstructedModel, samples: Samples) -> Array:
     torque = np.zeros((*v.shape, 2))
     kept = model.uncertainty.get("between_logs") or []
     known = model.uncertainty.get("between_logs_known", "different") != "assumed"
-    wider = _wider(min(model.uncertainty.get("between_logs_freedom") or np.inf, _TAILS)) if known else 1.0
+    freedom = min(model.uncertainty.get("between_logs_freedom") or np.inf, _TAILS)
+    wider = float(t.isf(norm.sf(3.0), freedom)) / 3.0 if known else 1.0
     columns = smooth(samples, np.stack([np.sign(v), v], axis=2)) if any(kept) else torque
     for j, T in enumerate(kept):
         if T is not None:
@@ -244,11 +245,6 @@ def friction_spread(model: ReconstructedModel, samples: Samples) -> Array:
             vectors *= wider * np.where([1.0, np.mean(np.abs(v[:, j]))] @ vectors < 0, -1.0, 1.0)
             torque[:, j] = columns[:, j] @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     return torque
-
-
-def _wider(freedom: float) -> float:
-    """By how much wider Student's t is than a normal variable at three standard deviations."""
-    return float(t.isf(norm.sf(3.0), freedom)) / 3.0
 
 
 def usual_in_words() -> str:

@@ -59,7 +59,7 @@ def friction_line(
         elif name == STRIBECK_VELOCITY:
             own = stribeck_term(terms)
             assert own is not None
-            weights[:, k] = fit @ _odd(_slope, own, v)
+            weights[:, k] = fit @ _odd(lambda term, motion: term.slope(motion, 0), own, v)
     values = line @ [t.coefficient for t in terms]
     errors = np.sqrt(np.maximum(np.einsum("ik,kl,il->i", weights, covariance, weights), 0.0))
     pairs = zip(("coulomb", "viscous"), values, errors, strict=True)
@@ -75,10 +75,6 @@ def entry(error: float, freedom: float) -> dict[str, float]:
 def _column(term: FrictionTerm, motion: Motion) -> Array:
     """A term's values where speeds have lasted: memory is fully slid."""
     return np.sign(motion.v[:, 0]) if term.kind == "hysteresis" else term.column(motion, 0)
-
-
-def _slope(term: FrictionTerm, motion: Motion) -> Array:
-    return term.slope(motion, 0)
 
 
 def _odd(of: Callable[[FrictionTerm, Motion], Array], term: FrictionTerm, v: Array) -> Array:

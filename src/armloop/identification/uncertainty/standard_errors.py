@@ -177,10 +177,11 @@ def covariances(
         if 0 < len(problem.unknowns) <= MOST_UNKNOWNS
     ]
     late = torque_lag([sums for _, sums in every])
-    found = [
-        Errors(unknowns, sums.covariance() + _outer(late * sums.shifted()), sums.degrees_of_freedom(), sums)
-        for unknowns, sums in every
-    ]
+    found = []
+    for unknowns, sums in every:
+        shift = late * sums.shifted()
+        covariance = sums.covariance() + np.outer(shift, shift)
+        found.append(Errors(unknowns, covariance, sums.degrees_of_freedom(), sums))
     return found, seconds, correlation
 
 
@@ -193,10 +194,6 @@ def torque_lag(equations: Sequence[Equations]) -> float:
     told = np.array([one.late() for one in equations]).reshape(-1, 2)
     score, information = told.sum(axis=0)
     return float(score / information) if information > 0 else 0.0
-
-
-def _outer(x: Array) -> Array:
-    return np.multiply.outer(x, x)
 
 
 def gauss_newton_steps(
