@@ -24,9 +24,10 @@ def coefficients_table(model: ReconstructedModel, title: str | None = "Coefficie
     errors = model.uncertainty
     if not errors:
         return None
-    rows: list[list[object]] = []
-    shared, lost = _shared_values(model), _undetermined(model)
-    rows += [
+    shared, groups = _shared_values(model), errors.get("undetermined", [])
+    # joint (from 1) and name of the coefficients that the training data do not tell from others
+    lost = {(group["joint"], name) for group in groups for name in group["coefficients"]}
+    rows: list[list[object]] = [
         ["", name, *_cells(shared[name], entry, (None, name) in lost)]
         for name, entry in errors["shared"].items()
         if name in shared
@@ -40,7 +41,7 @@ def coefficients_table(model: ReconstructedModel, title: str | None = "Coefficie
             for name, e in entries.items()
             if name in values
         ]
-    for group in errors.get("undetermined", []):
+    for group in groups:
         rows += [
             [group["joint"] or "", one["sum"], with_error(one["value"], one["std_error"]), *[MISSING] * 3]
             for one in group["sums"]
@@ -73,12 +74,6 @@ def _shared_values(model: ReconstructedModel) -> dict[str, float]:
         if data["kind"] == "lagrangian":
             return {row["term"]: row["coefficient"] for row in data["terms"]}
     return {}
-
-
-def _undetermined(model: ReconstructedModel) -> set[tuple[int | None, str]]:
-    """Joint (from 1) and name of the coefficients that the training data do not tell from others."""
-    groups = model.uncertainty.get("undetermined", [])
-    return {(group["joint"], name) for group in groups for name in group["coefficients"]}
 
 
 def _cells(value: float, entry: dict[str, float], lost: bool) -> list[str]:

@@ -24,12 +24,10 @@ def crossvalidation_tables(result: CrossValidation) -> list[Table]:
     """nRMSE per log and joint of moving samples, with the means; then RMSE at standstill."""
     n = len(result.per_joint)
     joints = [f"joint {j + 1}" for j in range(n)]
-    rows: list[list[object]] = []
-    for left_out in result.files:
-        score = left_out.score
-        rows.append(
-            [left_out.name, *map(number, score.moving["nrmse"]), number(mean_nrmse(score)), score.samples]
-        )
+    rows: list[list[object]] = [
+        [f.name, *map(number, f.score.moving["nrmse"]), number(mean_nrmse(f.score)), f.score.samples]
+        for f in result.files
+    ]
     rows.append(["mean", *map(number, result.per_joint), number(result.mean), ""])
     what = "each log" if result.leave_out == "file" else f"alternating blocks of {result.block_seconds:g} s"
     moving = make_table(

@@ -128,12 +128,8 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
     """Verdict, size of the effect, error before and after."""
     errors = diagnosis.errors()
     j = strongest_joint(diagnosis)
-    u, before, after, floor = (
-        unit(errors["unit"][j]),
-        errors["before"][j],
-        errors["after"][j],
-        errors["noise_floor"][j],
-    )
+    u = unit(errors["unit"][j])
+    before, after, floor = (errors[key][j] for key in ("before", "after", "noise_floor"))
     found = diagnosis.outcome.found
     if not found and diagnosis.contacts:
         count = len(diagnosis.contacts)

@@ -21,7 +21,10 @@ def excitation_report(result: Excitation, ratio: DataRatio | None) -> str:
     sections = [
         Section("The reference", say.paragraphs("reference"), shown, [use_table(result)], notes=result.notes)
     ]
-    cards = [Card(number(result.measure.condition), "Condition number", _beside(result))]
+    random = result.to_dict()["random"]["condition"]
+    median, low, high = (number(random[key]) for key in ("median", "low", "high"))
+    beside = f"random references: {median} ({low} to {high})"
+    cards = [Card(number(result.measure.condition), "Condition number", beside)]
     pictures = []
     if ratio is not None:
         pictures.append(Picture(data_figure(ratio, result), say["data_figure"]))
@@ -34,10 +37,3 @@ def excitation_report(result: Excitation, ratio: DataRatio | None) -> str:
         Section("Beside random references", say.paragraphs("random"), pictures, [measures_table(result)])
     )
     return render(Report(f"Exciting reference for {result.arm.name}", say["lead"], sections, cards))
-
-
-def _beside(result: Excitation) -> str:
-    random = result.to_dict()["random"]["condition"]
-    return (
-        f"random references: {number(random['median'])} ({number(random['low'])} to {number(random['high'])})"
-    )

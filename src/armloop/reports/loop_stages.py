@@ -13,16 +13,7 @@ from armloop.reports.findings import headline
 from armloop.reports.loop_result import LoopResult, mean_eta, truth_name, varying
 from armloop.reports.plots import Stage, ring_figure
 from armloop.reports.plots.ring import bars, lines
-from armloop.reports.plots.style import (
-    AFTER,
-    BEFORE,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PINK,
-    controller_colors,
-)
+from armloop.reports.plots.style import AFTER, BEFORE, BLUE, CYCLE, GREEN, GREY, ORANGE, controller_colors
 from armloop.reports.residuals import held_out_residuals, longest_run
 from armloop.reports.tables import mean_nrmse
 from armloop.reports.words import (
@@ -77,11 +68,7 @@ def told_in_stages(result: LoopResult, samples: Samples) -> tuple[list[Stage], s
             "Measure",
             counted(count, "sample"),
             listed([name.removesuffix("_velocity") for name in result.logs]).replace("_", " "),
-            lines(
-                time,
-                list((q / np.abs(q).max(axis=0)).T),
-                ([BLUE, ORANGE, GREEN, PINK, GREY] * 2)[: q.shape[1]],
-            ),
+            lines(time, list((q / np.abs(q).max(axis=0)).T), (CYCLE * 2)[: q.shape[1]]),
         ),
         Stage(
             "Reconstruct",

@@ -227,18 +227,18 @@ def score_table(
     score: Score, arm: Arm, title: str | None = "Prediction error", units: Sequence[str] | None = None
 ) -> Table:
     """RMSE and nRMSE per joint, of the moving joint and at standstill; in units, if they are not those of torques."""
-    rows, units = [], units or arm.torque_units
-    for j, joint in enumerate(arm.joints):
-        rows.append(
-            [
-                f"{j + 1}  {joint.name}",
-                unit(units[j]),
-                score.rms[j],
-                score.moving["rmse"][j],
-                percent(score.moving["nrmse"][j]),
-                score.standstill["rmse"][j],
-            ]
-        )
+    units = units or arm.torque_units
+    rows = [
+        [
+            f"{j + 1}  {joint.name}",
+            unit(units[j]),
+            score.rms[j],
+            score.moving["rmse"][j],
+            percent(score.moving["nrmse"][j]),
+            score.standstill["rmse"][j],
+        ]
+        for j, joint in enumerate(arm.joints)
+    ]
     headers = ["joint", "unit", "RMS measured", "RMSE moving", "nRMSE moving", "RMSE at rest"]
     return make_table(headers, rows, title, left=(0, 1))
 
@@ -261,7 +261,8 @@ def parts_table(parts: Sequence[Parts], arm: Arm) -> Table:
     rows = [
         [
             f"{one.joint}  {joint.name}",
-            _exact_percent(one.explained),
+            # nearly all, with as many nines as it has
+            MISSING if one.explained is None else f"{100 * one.explained:.2f} %",
             percent(one.predictable_left),
             percent(one.std_error),
             percent(one.noise),
@@ -278,11 +279,6 @@ def parts_table(parts: Sequence[Parts], arm: Arm) -> Table:
         "residual's memory",
     ]
     return make_table(headers, rows, "Parts of the torque's energy")
-
-
-def _exact_percent(x: float | None) -> str:
-    """A part that is nearly all, with as many nines as it has."""
-    return MISSING if x is None else f"{100 * x:.2f} %"
 
 
 def seconds_table(seconds: Mapping[str, float]) -> Table:

@@ -29,21 +29,20 @@ def gains_table(tuning: Tuning) -> Table:
 
 def margins_table(tuning: Tuning) -> Table:
     """Phase and gain margin, bandwidth and sensitivity peak per joint; the worst along the reference beside them."""
-    rows: list[list[object]] = []
-    for name, loop in _both(tuning):
-        for j, m in enumerate(loop.margins):
-            rows.append(
-                [
-                    name if loop.stable else f"{name} (UNSTABLE)",
-                    j + 1,
-                    m.phase_margin,
-                    float(loop.worst[0][j]),
-                    m.gain_margin,
-                    m.bandwidth / (2 * np.pi),
-                    m.sensitivity_peak,
-                    float(loop.worst[1][j]),
-                ]
-            )
+    rows = [
+        [
+            name if loop.stable else f"{name} (UNSTABLE)",
+            j + 1,
+            m.phase_margin,
+            float(loop.worst[0][j]),
+            m.gain_margin,
+            m.bandwidth / (2 * np.pi),
+            m.sensitivity_peak,
+            float(loop.worst[1][j]),
+        ]
+        for name, loop in _both(tuning)
+        for j, m in enumerate(loop.margins)
+    ]
     headers = ["phase margin [deg]", "worst", "gain margin", "bandwidth [Hz]", "peak |S|", "worst"]
     return make_table(["gains", "joint", *headers], rows, "Loops, the other joints' closed")
 

@@ -183,9 +183,9 @@ def _card(made: Figure, page: Axes, count: int, stage: Stage, place: tuple[float
         va="center",
         zorder=5,
     )
-    page.text(
-        x + 0.18, y + 0.2, stage.text, color=MUTED, fontsize=_fitting(stage.text), va="center", zorder=5
-    )
+    # so that it stays within the card
+    size = min(9.0, 9.0 * 37 / max(len(stage.text), 1))
+    page.text(x + 0.18, y + 0.2, stage.text, color=MUTED, fontsize=size, va="center", zorder=5)
     width, height = made.get_size_inches()
     axes = made.add_axes(
         (
@@ -199,11 +199,6 @@ def _card(made: Figure, page: Axes, count: int, stage: Stage, place: tuple[float
     )
     axes.axis("off")
     stage.draw(axes)
-
-
-def _fitting(text: str) -> float:
-    """Font size at which a line of text stays within a card."""
-    return min(9.0, 9.0 * 37 / max(len(text), 1))
 
 
 def lines(
