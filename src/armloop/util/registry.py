@@ -6,7 +6,7 @@ Nothing of a user's is imported before it is asked for: by its name, that one; a
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
@@ -16,6 +16,15 @@ from armloop.util.errors import InputError
 T = TypeVar("T")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+
+def check_class(kind: Any, where: str, base: type, public: str, needed: Sequence[str] = ()) -> None:
+    """Raise ``InputError`` unless a class is a subclass of ``base``, that users know as ``public``, with what it needs."""
+    if not (isinstance(kind, type) and issubclass(kind, base)):
+        raise InputError(f"{where}: is {kind!r}; it must be a subclass of {public}")
+    missing = [key for key in needed if getattr(kind, key, None) is getattr(base, key, None)]
+    if missing:
+        raise InputError(f"{where}: {kind.__name__} lacks {', '.join(missing)}; define them in the class")
 
 
 class Registry(Generic[T]):

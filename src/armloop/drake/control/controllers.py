@@ -24,8 +24,7 @@ from armloop.drake.plant.fault_injection import Effects
 from armloop.dynamics import Dynamics, with_mass_matrix
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
-from armloop.util.errors import InputError
-from armloop.util.registry import Registry
+from armloop.util.registry import Registry, check_class
 
 MAIN_MODEL = "model"
 """The name in `models` of the one that serves every controller that has none of its own."""
@@ -153,11 +152,7 @@ def _as_stiff(scenario: TrackingScenario, model: FeedforwardModel | None) -> Acc
 
 
 def _check(kind: Any, where: str) -> None:
-    if not (isinstance(kind, type) and issubclass(kind, Controller)):
-        raise InputError(f"{where}: is {kind!r}; it must be a subclass of armloop.drake.Controller")
-    missing = [key for key in ("name", "law") if getattr(kind, key, None) is getattr(Controller, key, None)]
-    if missing:
-        raise InputError(f"{where}: {kind.__name__} lacks {', '.join(missing)}; define them in the class")
+    check_class(kind, where, Controller, "armloop.drake.Controller", ("name", "law"))
 
 
 LISTED: dict[str, type[Controller]] = {

@@ -15,15 +15,14 @@ from armloop.laws.effects.base import Effect
 from armloop.laws.effects.law import Law
 from armloop.laws.effects.listed import EFFECTS
 from armloop.util.errors import InputError
-from armloop.util.registry import Registry
+from armloop.util.registry import Registry, check_class
 
 Kind = TypeVar("Kind", bound=type[Effect])
 
 
 def _check(kind: Any, where: str) -> None:
     """Raise ``InputError`` unless ``kind`` is a complete effect."""
-    if not (isinstance(kind, type) and issubclass(kind, Effect)):
-        raise InputError(f"{where}: is {kind!r}; it must be a subclass of armloop.laws.effects.Effect")
+    check_class(kind, where, Effect, "armloop.laws.effects.Effect")
     # class attributes that a base class asks for and nobody has given
     asked = [pair for base in kind.__mro__ for pair in inspect.get_annotations(base).items()]
     missing = [key for key, hint in asked if "ClassVar" in str(hint) and not hasattr(kind, key)]

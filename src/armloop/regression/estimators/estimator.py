@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 from armloop.regression.estimators.problem import Problem
 from armloop.util.arrays import Array
-from armloop.util.errors import InputError
+from armloop.util.registry import check_class
 
 
 class Estimator:
@@ -40,10 +40,4 @@ class Estimator:
 
 def check_estimator(kind: Any, where: str) -> None:
     """Raise ``InputError`` unless ``kind`` is a complete estimator."""
-    if not (isinstance(kind, type) and issubclass(kind, Estimator)):
-        raise InputError(
-            f"{where}: is {kind!r}; it must be a subclass of armloop.regression.estimators.Estimator"
-        )
-    missing = [key for key in ("name", "choose") if getattr(kind, key, None) is getattr(Estimator, key, None)]
-    if missing:
-        raise InputError(f"{where}: {kind.__name__} lacks {', '.join(missing)}; define them in the class")
+    check_class(kind, where, Estimator, "armloop.regression.estimators.Estimator", ("name", "choose"))
