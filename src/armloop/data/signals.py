@@ -19,6 +19,7 @@ from armloop.data.dropouts import later, repaired
 from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
 from armloop.data.log import FEWEST_SAMPLES, MotionLog
 from armloop.data.motion import Motion, Samples
+from armloop.data.rate_noise import central_differences
 from armloop.data.recorded import Recorded
 from armloop.util.arrays import PER_MEDIAN, Array, Mask
 from armloop.util.errors import LogError
@@ -268,11 +269,7 @@ def smooth(samples: Samples, x: Array, runs: Sequence[slice] | None = None) -> A
 
 def rate_along(samples: Samples, x: Array) -> Array:
     """(N, ...) rate of x (N, ...) along every run, per second; zero where samples are no time series."""
-    rate = np.zeros_like(x)
-    for run in samples.motion.runs() if samples.cutoff_hz > 0 else []:
-        if run.stop - run.start > 1:
-            rate[run] = np.gradient(x[run], samples.motion.time[run], axis=0)
-    return rate
+    return central_differences(samples.motion.time, x, samples.motion.runs() if samples.cutoff_hz > 0 else [])
 
 
 def as_torque(samples: Samples) -> Samples:

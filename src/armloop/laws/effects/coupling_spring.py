@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Value, less, number
+from armloop.laws.effects.joint_spring import JointSpring
 from armloop.laws.effects.law import Law
-from armloop.laws.friction import Element
 from armloop.robot.arm import Arm
 
 #: A tendon moves with either joint by at least this part of what it moves with the other.
@@ -31,10 +31,7 @@ class CouplingSpring(Law):
         Parameter("ratio"),
     )
     law = "k (w - w0), w = q + r q'"
-    elements = (
-        Element(lambda x, p, f: x.q, "q{j}", part="position"),
-        Element(lambda x, p, f: -1.0, "-1", part="position"),
-    )
+    elements = JointSpring.elements
     load = True
     watched = False
     nested = 1
