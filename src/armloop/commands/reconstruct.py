@@ -102,6 +102,7 @@ def run(options: Reconstruct) -> None:
     from armloop.util.workers import Cluster, Processes
 
     sparse, snr = Sparse(options.estimator, options.penalty), _snr(options)
+    names = None if options.friction is None else [name.strip() for name in options.friction.split(",")]
     take_file(options.out, "--out")
     take_file(options.report, "--report")
     arm = arm_of(options)
@@ -124,7 +125,7 @@ def run(options: Reconstruct) -> None:
                 max_order=options.max_order,
                 physical=not options.no_physical,
                 snr=snr,
-                friction=_laws(options.friction),
+                friction=None if names is None else tuple(filter(None, names)),
             ),
             progress(options),
             recorded,
@@ -162,11 +163,6 @@ def run(options: Reconstruct) -> None:
     for note in [*unjudged(result.parts), *result.notes]:
         print(wrapped(f"note: {note}"))
     print(f"model written to {options.out}")
-
-
-def _laws(text: str | None) -> tuple[str, ...] | None:
-    """The names of ``--friction``."""
-    return None if text is None else tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def _snr(options: Reconstruct) -> tuple[float, float, float] | None:

@@ -96,9 +96,9 @@ def find_logs(places: Sequence[str | Path], listed: bool = False) -> list[LogFil
             for path in logs:
                 inside = path.relative_to(place).parts[:-1]
                 arm = inside[0] if inside else ""
-                found[path] = LogFile(
-                    path, arm, _programme(inside[1:]), (*reversed(inside), place.resolve().name)
-                )
+                # the folders below the arm's, those that are dates left out
+                programme = "/".join(name for name in inside[1:] if not _DATE.fullmatch(name))
+                found[path] = LogFile(path, arm, programme, (*reversed(inside), place.resolve().name))
         elif place.is_file() or listed:
             folder = place.resolve().parent.name
             found[place] = LogFile(place, folder, "", (folder,))
@@ -131,11 +131,6 @@ def _below(place: Path) -> tuple[list[Path], list[Path]]:
             elif kind_of(path) in _OTHERS:
                 others.append(path)
     return logs, others
-
-
-def _programme(folders: Sequence[str]) -> str:
-    """The folders below the arm's, those that are dates left out."""
-    return "/".join(name for name in folders if not _DATE.fullmatch(name))
 
 
 def arm_in(path: Path) -> tuple[str, str]:
