@@ -29,6 +29,10 @@ SCHEMA = "armloop/model/2"
 _SUM = Annotated[float, Meta(ge=-1e12, le=1e12, description="SI units")]
 _Joints = Meta(min_length=1, max_length=MOST_JOINTS)
 _Terms = Meta(max_length=MOST_TERMS)
+_TWO = Meta(min_length=2, max_length=2)
+_Pair = Annotated[list[Finite], _TWO]
+_Ranges = Annotated[list[Annotated[list[Finite], _Joints]], Meta(min_length=4, max_length=4)]
+_Numbers = Annotated[str, Meta(pattern=r"^(-?[0-9]+([.][0-9]+)?(e[+-]?[0-9]+)?( |$))+$", max_length=100_000)]
 
 
 class JointData(Struct, forbid_unknown_fields=True):
@@ -79,7 +83,7 @@ class EnergyTermData(Struct):
     coefficient: _SUM
     degrees: Annotated[list[Annotated[int, Meta(ge=-9, le=9)]], Meta(max_length=MOST_JOINTS)]
     sine: bool
-    speeds: Annotated[list[Annotated[int, Meta(ge=0, le=MOST_JOINTS)]], Meta(min_length=2, max_length=2)]
+    speeds: Annotated[list[Annotated[int, Meta(ge=0, le=MOST_JOINTS)]], _TWO]
 
 
 class LagrangianData(Struct, tag_field="kind", tag="lagrangian"):
@@ -203,9 +207,7 @@ class HistoryData(Struct):
     library: Name | None = None
     logs: Annotated[list[Text], Meta(max_length=100_000)] = []
     notes: Annotated[list[Text], Meta(max_length=10_000)] = []
-    range: Annotated[list[Annotated[list[Finite], _Joints]], Meta(min_length=4, max_length=4)] | UnsetType = (
-        UNSET
-    )
+    range: _Ranges | UnsetType = UNSET
     slowest: Annotated[list[NotNegative], _Joints] | UnsetType = UNSET
     velocity_noise: Annotated[list[NotNegative], _Joints] | UnsetType = UNSET
     inertial: Annotated[list[_SUM], Meta(max_length=10 * MOST_JOINTS)] | UnsetType = UNSET
@@ -226,9 +228,7 @@ class TorqueErrorsData(Struct):
 
     unknowns: Annotated[list[Text], _Terms]
     directions: Annotated[
-        list[
-            Annotated[str, Meta(pattern=r"^(-?[0-9]+([.][0-9]+)?(e[+-]?[0-9]+)?( |$))+$", max_length=100_000)]
-        ],
+        list[_Numbers],
         Meta(
             max_length=MOST_TERMS,
             description="per unknown its part of each, up to the diagonal; numbers and blanks",
@@ -249,13 +249,7 @@ class UncertaintyData(Struct):
     torque: Annotated[list[TorqueErrorsData], Meta(max_length=MOST_JOINTS)] = []
     torque_lag: Finite = 0.0
     between_logs: Annotated[
-        list[
-            Annotated[
-                list[Annotated[list[Finite], Meta(min_length=2, max_length=2)]],
-                Meta(min_length=2, max_length=2),
-            ]
-            | None
-        ],
+        list[Annotated[list[_Pair], _TWO] | None],
         Meta(
             max_length=MOST_JOINTS,
             description="per joint the covariance of dry level and viscous coefficient",
