@@ -256,7 +256,7 @@ def fit_of(*relative: float, faults: int = 0) -> Fit:
 def test_another_stance_must_explain_more_than_what_looks_like_it(
     other: Fit, sprung: Fit, taken: bool
 ) -> None:
-    springs = SimpleNamespace(fit=lambda signs, order: sprung)
+    springs = SimpleNamespace(fit=lambda: sprung)
     problem: Any = SimpleNamespace(arm=SimpleNamespace(n=3), sprung=lambda: springs)
     assert earned(problem, fit_of(0.3, 0.3, 0.3, faults=1), other) is taken
 
@@ -282,8 +282,8 @@ def test_a_lean_is_more_than_a_degree_and_its_error(
     down = np.array([np.sin(np.radians(degrees)), 0.0, -np.cos(np.radians(degrees))])
     found = Direction(down, np.eye(3)[:2], np.diag([np.radians(error) ** 2] * 2))
     better, plain = fit_of(0.1, 0.1), fit_of(0.3, 0.3)
-    leaning = SimpleNamespace(left=lambda: better, fit=lambda signs, order: better)
-    level = SimpleNamespace(left=lambda: plain, fit=lambda signs, order: plain)
+    leaning = SimpleNamespace(left=lambda: better, fit=lambda: better)
+    level = SimpleNamespace(left=lambda: plain, fit=lambda: plain)
     problem: Any = SimpleNamespace(
         arm=SimpleNamespace(n=2, gravity=np.array([0.0, 0.0, -9.81])),
         under=lambda other: leaning if other @ down > 0.9999 else level,

@@ -213,7 +213,7 @@ class TestTorqueChecks:
         plain = fitted([0.9, 0.9, 0.9], [1] * 3, [1] * 3)
 
         def found(*after: float, power: float = 1.0) -> list[tuple[int, int]]:
-            def fit(signs: np.ndarray, order: np.ndarray, half: int | None = None) -> Fit:
+            def fit(signs: Any = None, order: Any = None, half: int | None = None) -> Fit:
                 key = tuple(order.tolist())
                 error = dict(zip([(1, 0, 2), (2, 1, 0), (0, 2, 1)], after, strict=True))[key]
                 return fitted([error] * 3, [power] * 3, [1] * 3)
@@ -235,7 +235,7 @@ class TestTorqueChecks:
             error: float = 0.5,
             plain: Fit = driven,
         ) -> list[int]:
-            def fit(signs: np.ndarray, order: np.ndarray, half: int | None = None) -> Fit:
+            def fit(signs: Any = None, order: Any = None, half: int | None = None) -> Fit:
                 if half is not None:
                     return fitted([0.5] * 2, [1.0, halves[half]], [1.0, halves[half]])
                 if signs.tolist() == [1.0, -1.0]:

@@ -33,7 +33,7 @@ def test_errors_friction_and_inertia_of_a_fit() -> None:
     arm, base = SimpleNamespace(n=2), SimpleNamespace(count=1)
     problem: Any = PlainFits(arm, base, table, np.zeros((3, 2)))  # type: ignore[arg-type]
     problem.__dict__["mass"] = mass
-    found = problem.fit(np.ones(2), np.arange(2))
+    found = problem.fit()
     sizes = [np.sqrt(np.mean(tau[rows, j] ** 2)) for j, rows in enumerate(moving.T)]
     np.testing.assert_allclose(found.relative, 0.1 / np.array(sizes), rtol=0.08)
     np.testing.assert_allclose(found.inertia, [4.0, 10.0], rtol=0.01)

@@ -265,7 +265,7 @@ class Given:
     def every(self, step: int) -> Any:
         return self
 
-    def fit(self, signs: Array, order: Index) -> Fit:
+    def fit(self) -> Fit:
         return self.plain
 
     def left(self) -> Fit:
@@ -283,7 +283,7 @@ class Given:
 
     def _left(self, reading: str) -> Any:
         fit = self.plain if reading == "plain" else self.others.get(reading)
-        return None if fit is None else SimpleNamespace(fit=lambda signs, order: fit, left=lambda: fit)
+        return None if fit is None else SimpleNamespace(fit=lambda: fit, left=lambda: fit)
 
 
 def chosen(plain: Fit, others: dict[str, Fit], monkeypatch: pytest.MonkeyPatch) -> str:

@@ -115,9 +115,9 @@ class Fits(torque_checks.Problem):
     def __init__(self, **fits: torque_checks.Fit) -> None:
         object.__setattr__(self, "fits", fits)
 
-    def fit(self, signs: np.ndarray, order: np.ndarray, half: int | None = None) -> torque_checks.Fit:
+    def fit(self, signs: Any = (1.0, 1.0), order: Any = (0, 1), half: int | None = None) -> torque_checks.Fit:
         assert set(np.abs(signs)) == {1.0}
-        turned = "".join(str(j + 1) for j in np.flatnonzero(signs < 0))
+        turned = "".join(str(j + 1) for j in np.flatnonzero(np.array(signs) < 0))
         name = f"half_{half}" if half is not None else f"turned_{turned}"
         if (order != np.arange(len(order))).any():
             name = "order_" + "".join(str(j + 1) for j in order)
@@ -198,7 +198,7 @@ class Scaled(Fits):
         super().__init__(**fits)
         object.__setattr__(self, "factors", factors)
 
-    def fit(self, signs: np.ndarray, order: np.ndarray, half: int | None = None) -> torque_checks.Fit:
+    def fit(self, signs: Any, order: Any = None, half: int | None = None) -> torque_checks.Fit:
         (changed,) = np.flatnonzero(signs != 1)
         return self.fits[f"scaled_{changed + 1}"]  # type: ignore[attr-defined, no-any-return]
 

@@ -71,7 +71,7 @@ def test_of_joints_that_carry_none_nothing_is_explained_either_way() -> None:
         return Fit(np.array(relative), np.ones(2), np.ones(2))
 
     for still, alone in ((fit(1.0, 1.0), False), (fit(0.3, 1.0), True)):
-        given = SimpleNamespace(fit=lambda signs, order, still=still: still)
+        given = SimpleNamespace(fit=lambda still=still: still)
         problem: Any = SimpleNamespace(arm=Arm(np.zeros(3)), of_weight_alone=lambda given=given: given)
         assert weight_alone(problem, still) is alone
 
@@ -99,7 +99,7 @@ def test_it_speaks_plainly_of_all_joints_and_physically(
     def fit(relative: list[float], power: float) -> Fit:
         return Fit(np.array(relative), np.array([1.0, power]), np.ones(2))
 
-    asked = SimpleNamespace(fit=lambda signs, order: fit(relative, power))
+    asked = SimpleNamespace(fit=lambda: fit(relative, power))
     problem: Any = SimpleNamespace(
         arm=Arm(np.array([0.0, 0.0, -9.8])), as_of=lambda arm: None if arm.gravity.any() else asked
     )

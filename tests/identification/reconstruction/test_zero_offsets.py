@@ -115,9 +115,7 @@ def test_a_zero_is_off_by_more_than_its_error_and_another_one_by_more_than_a_thi
         False: Fit(*np.array([[0.3] * 4, [1.0] * 4, [1.0] * 4])),
         True: Fit(*np.array([[0.1] * 4, [1.0] * 4, [1.0] * 4])),
     }
-    fits = {
-        key: SimpleNamespace(left=lambda f=fit: f, fit=lambda s, o, f=fit: f) for key, fit in errors.items()
-    }
+    fits = {key: SimpleNamespace(left=lambda f=fit: f, fit=lambda f=fit: f) for key, fit in errors.items()}
     problem: Any = SimpleNamespace(
         arm=SimpleNamespace(
             n=4, revolute=np.array([True, True, False, True]), with_zero=lambda joint, by: (joint, by)

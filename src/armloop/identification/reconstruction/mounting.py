@@ -118,7 +118,6 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
         problem: what is regressed of the record as it stands.
         plain: what is left of it.
     """
-    ones, as_given = np.ones(problem.arm.n), np.arange(problem.arm.n)
     few = problem.every(SCREENED)
     first = few.left()
 
@@ -144,14 +143,14 @@ def other_mounting(problem: PlainFits, plain: Fit) -> Mounting | None:
     near = [one for lean in leans if quickly(lean) > PROMISING for one in refined(problem, [Mounting(lean)])]
     lean = max((one for one in near if one.slight), key=lambda one: times(one.down), default=None)
     if lean is not None and (found is None or times(lean.down) >= AS_GOOD * times(found)):
-        other = problem.under(lean.down).fit(ones, as_given)
+        other = problem.under(lean.down).fit()
         return lean if lean.clearness > 1 and earned(problem, plain, other) else None
     return None if found is None else Mounting(found)
 
 
 def earned(problem: PlainFits, plain: Fit, other: Fit) -> bool:
     """Whether the arm, taken to stand otherwise, explains more than laws that look like it."""
-    sprung = problem.sprung().fit(np.ones(problem.arm.n), np.arange(problem.arm.n))
+    sprung = problem.sprung().fit()
     each = sorted(plain.over(other, [j]) for j in range(problem.arm.n))
     mean = plain.over(other)
     physical = other.faults.sum() <= plain.faults.sum()

@@ -185,9 +185,11 @@ class PlainFits:
         scale = np.maximum(table.sizes(table.tau, table.moving), LEAST)
         return Fit(error / scale, np.ones(len(scale)), np.ones(len(scale)))
 
-    def fit(self, signs: Array, order: Index, half: int | None = None) -> Fit:
-        """Regress the torques with these signs in this order, of all blocks or of every other one."""
-        table, n, r = self.table, len(signs), self.base.count
+    def fit(
+        self, signs: Array | float = 1.0, order: Index | slice = slice(None), half: int | None = None
+    ) -> Fit:
+        """Regress the torques, as recorded or with these signs in this order, of all blocks or of every other one."""
+        table, n, r = self.table, self.arm.n, self.base.count
         tau = signs * table.tau[:, order]
         rows = table.moving if half is None else table.moving & (table.blocks % 2 == half)[:, None]
         scale = table.sizes(tau, rows)

@@ -220,17 +220,16 @@ def meant(
     poorly: dict[int, str] = {}
     few = problem.every(SCREENED)
     first = few.left()
-    sprung = problem.sprung().fit(np.ones(n), np.arange(n))
+    sprung = problem.sprung().fit()
     stances = [other for other in (other_mounting(problem, plain), other_zero(problem, plain)) if other]
     stood = (Reading(np.arange(n), stance=stance) for stance in stances)
     for reading in (*stood, *readings(problem.arm)):
-        if reading.turned:
-            if first.over(reading.read(few).left()) < PROMISING:
-                continue
+        if reading.turned and first.over(reading.read(few).left()) < PROMISING:
+            continue
         read = reading.problem(problem, logs, cutoff_hz)
         if read is None:
             continue
-        other = read.fit(np.ones(n), np.arange(n))
+        other = read.fit()
         if reading.slight or reading.far_better(plain, other, sprung):
             found.append((reading, plain.over(other)))
             poorly[id(reading)] = _another_arm(other)

@@ -38,8 +38,8 @@ def together(problem: PlainFits, plain: Fit) -> list[Stance]:
         problem: what is regressed of the record as it stands.
         plain: what is left of it.
     """
-    n, few = problem.arm.n, problem.every(SCREENED)
-    zeros = (ZeroOffset(j, 0.0, 0.0) for j in np.flatnonzero(problem.arm.revolute[: n - 1]).tolist())
+    few = problem.every(SCREENED)
+    zeros = (ZeroOffset(j, 0.0, 0.0) for j in np.flatnonzero(problem.arm.revolute[:-1]).tolist())
     first = _estimated(few, [*_level(problem), *zeros], _FIRST)
     if few.left().over(first.fit) < PROMISING:
         return []
@@ -49,7 +49,7 @@ def together(problem: PlainFits, plain: Fit) -> list[Stance]:
     stances = _estimated(problem, kept, _AGAIN).stances
     if not all(stance.slight for stance in stances):
         return []
-    other = problem.as_of(as_it_stands(problem.arm, stances)).fit(np.ones(n), np.arange(n))
+    other = problem.as_of(as_it_stands(problem.arm, stances)).fit()
     return stances if earned(problem, plain, other) else []
 
 

@@ -67,7 +67,7 @@ def check_torques(
         return []
     named = list(dict.fromkeys(log.name for log in chosen))
     names = ", ".join(named[:3]) + (", ..." if len(named) > 3 else "")
-    plain = problem.fit(np.ones(arm.n), np.arange(arm.n))
+    plain = problem.fit()
     if weight_alone(problem, plain):
         # of joints that carry none there is nothing but noise, which any other sign, order or unit explains as well
         warn(f"{names}: {WEIGHT_ALONE}")
@@ -107,7 +107,7 @@ def _one_fault(problem: Problem, plain: Fit, n: int) -> Iterator[tuple[str, Fit]
             f"columns tau{i + 1} and tau{j + 1} are exchanged: the other way round they are explained "
             "at least twice as well; put the columns in the order of the joints, base to tip"
         )
-        yield fault, problem.fit(np.ones(n), order)
+        yield fault, problem.fit(order=order)
     for j, factor in problem.better_scaled(plain):
         factors = np.ones(n)
         factors[j] = factor
@@ -115,7 +115,7 @@ def _one_fault(problem: Problem, plain: Fit, n: int) -> Iterator[tuple[str, Fit]
             f"the torques do not fit one another: tau{j + 1} is about {float(f'{1 / factor:.2g}'):g} times what "
             "the links give that explain the other joints; check the units and drive gains of all joints"
         )
-        yield fault, problem.fit(factors, np.arange(n))
+        yield fault, problem.fit(factors)
 
 
 def _otherwise(
@@ -126,8 +126,7 @@ def _otherwise(
     found = together(problem, plain) or ([stance] if stance else [])
     if wrong and found:
         stood = problem.as_of(as_it_stands(problem.arm, found))
-        left = stood.fit(np.ones(problem.arm.n), np.arange(problem.arm.n))
-        wrong, _ = meant(stood, logs, cutoff_hz, left)
+        wrong, _ = meant(stood, logs, cutoff_hz, stood.fit())
     return wrong, found
 
 
@@ -145,15 +144,14 @@ class Problem(PlainFits):
                 continue
             signs = np.ones(n)
             signs[group] = -1.0
-            order = np.arange(n)
-            other = self.fit(signs, order)
+            other = self.fit(signs)
             gain = plain.over(other)
             if not other.physical(range(n)) or gain < 0.99:
                 continue
             plainly = (
                 len(group) == 1 and plain.over(other, group) > _BETTER and other.relative[group].max() < GOOD
             )
-            halves = (self.fit(np.ones(n), order, half) for half in (0, 1))
+            halves = (self.fit(half=half) for half in (0, 1))
             if other.power[group].max() > _DRIVES and (plainly or all(one.driven(group) for one in halves)):
                 suspects.append((gain, group))
         return max(suspects)[1] if suspects else []
@@ -164,7 +162,7 @@ class Problem(PlainFits):
         for i, j in combinations(range(len(plain.power)), 2):
             order = np.arange(len(plain.power))
             order[[i, j]] = order[[j, i]]
-            other = self.fit(np.ones(len(order)), order)
+            other = self.fit(order=order)
             gain = plain.over(other, [i, j])
             if gain > _BETTER and other.physical([i, j]) and other.relative[[i, j]].max() < GOOD:
                 found.append((gain, (i, j)))
@@ -182,7 +180,7 @@ class Problem(PlainFits):
                 continue
             factors = np.ones(n)
             factors[j] = factor
-            other = self.fit(factors, np.arange(n))
+            other = self.fit(factors)
             if plain.over(other, [j]) > _BETTER and other.physical(range(n)) and other.relative[j] < GOOD:
                 found.append((plain.over(other), (j, factor)))
         return [max(found)[1]] if found and max(found)[0] > 1 else []

@@ -23,8 +23,7 @@ def times_lighter(problem: PlainFits, plain: Fit) -> float:
         problem: what is regressed of the record as it stands.
         plain: what is left of it.
     """
-    arm = problem.arm
-    light = problem.as_of(replace(arm, gravity=np.zeros(3))).fit(np.ones(arm.n), np.arange(arm.n))
+    light = problem.as_of(replace(problem.arm, gravity=np.zeros(3))).fit()
     if light.faults.sum() > plain.faults.sum() or light.relative.max() >= GOOD:
         return 0.0
     times = plain.over(light)
@@ -46,7 +45,7 @@ def weight_alone(problem: PlainFits, plain: Fit) -> bool:
         problem: what is regressed of the record as it stands.
         plain: what is left of it.
     """
-    still = problem.of_weight_alone().fit(np.ones(problem.arm.n), np.arange(problem.arm.n))
+    still = problem.of_weight_alone().fit()
     # of an upright joint, which carries none, nothing is explained either way
     return bool(still.relative.min() < GOOD and plain.over(still) >= AS_GOOD)
 

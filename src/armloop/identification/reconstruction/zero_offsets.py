@@ -84,7 +84,6 @@ def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
         problem: what is regressed of the record as it stands.
         plain: what is left of it.
     """
-    n = problem.arm.n
     few = problem.every(SCREENED)
     first = few.left()
 
@@ -92,14 +91,14 @@ def other_zero(problem: PlainFits, plain: Fit) -> ZeroOffset | None:
         return first.over(few.as_of(few.arm.with_zero(joint, angle)).left())
 
     tried: list[tuple[float, ZeroOffset]] = []
-    for joint in np.flatnonzero(problem.arm.revolute[: n - 1]).tolist():
+    for joint in np.flatnonzero(problem.arm.revolute[:-1]).tolist():
         starts = [0.0, max(_STARTS, key=lambda start: quickly(joint, start))]
         for start in starts if quickly(joint, starts[1]) > PROMISING else starts[:1]:
             (offset,) = refined(few, [ZeroOffset(joint, start, np.inf)])
             if abs(offset.angle) < _EXACT or quickly(joint, offset.angle) < PROMISING:
                 continue
             (offset,) = refined(problem, [offset])
-            other = problem.as_of(offset.of(problem.arm)).fit(np.ones(n), np.arange(n))
+            other = problem.as_of(offset.of(problem.arm)).fit()
             if offset.clearness > 1 and earned(problem, plain, other):
                 tried.append((plain.over(other), offset))
     return max(tried, key=lambda one: one[0])[1] if tried else None
