@@ -14,6 +14,7 @@ import numpy as np
 
 from armloop.features.double_feature_set import Factors
 from armloop.laws.friction import FrictionTerm
+from armloop.regression.moments import unit_length
 from armloop.util.arrays import Array, Index, Mask
 
 #: Squared sine of the angle between two columns below which they are one function on the data: their difference
@@ -44,9 +45,9 @@ def repeated(G: Array, first: Index, others: Index) -> Mask:
         G: (p, p) products of all columns, summed over the samples.
     """
     order = np.concatenate([first, others]).astype(np.intp)
-    size = np.sqrt(np.maximum(np.diag(G)[order], 0.0))
-    alive = size > 0
-    scale = np.where(alive, 1 / np.where(alive, size, 1.0), 0.0)
+    squares = np.diag(G)[order]
+    alive = squares > 0
+    scale = unit_length(squares) * alive
     same = 1 - (G[np.ix_(order, order)] * np.outer(scale, scale)) ** 2 < SAME
     same[~alive] = same[:, ~alive] = False
     kept = np.ones(len(order), dtype=bool)

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from armloop.regression.clustered import delete_one
+from armloop.regression.moments import equilibrated, unit_length
 from armloop.util.arrays import TINY, Array, Index
 
 #: Relative ridge against columns that a block's removal leaves dependent; their errors come out huge, as they are.
@@ -61,7 +62,7 @@ class Equations:
     @cached_property
     def scale(self) -> Array:
         """(p,) factors that make the columns' squares sum to one."""
-        return _scale(self.jacobian.sum(axis=0))
+        return unit_length(np.diagonal(self.jacobian.sum(axis=0)))
 
     @cached_property
     def _scaled(self) -> Array:
@@ -119,14 +120,8 @@ class Equations:
 
 def gauss_newton_step(jacobian: Array, score: Array) -> Array:
     """(p,) step towards the root of estimating equations with these sums (p, p), (p,) over all samples."""
-    scale = _scale(jacobian)
-    total = _ridged(jacobian * np.multiply.outer(scale, scale))
+    scale, total = equilibrated(jacobian, _RIDGE)
     return np.asarray(scale * np.linalg.solve(total, scale * score))
-
-
-def _scale(jacobian: Array) -> Array:
-    squares = np.diagonal(jacobian)
-    return np.asarray(1 / np.sqrt(np.where(squares > 0, squares, 1.0)))
 
 
 def _ridged(products: Array) -> Array:
