@@ -18,6 +18,7 @@ from armloop.convert.wraps import unwrapped
 from armloop.data.header import JOINT_COLUMN
 from armloop.data.log import FEWEST_SAMPLES, GAP_PERIODS, MotionLog, unchecked_log
 from armloop.data.plausibility import LARGEST_Q
+from armloop.data.rate_noise import central_differences
 from armloop.robot.arm import Arm
 from armloop.util.errors import LogError
 
@@ -70,12 +71,13 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     cells = {name: cells[keep] for name, cells in values.items()}
     if not np.any(cells["tau"]):
         raise LogError(f"{where}: the torques are zero throughout; this source did not record them")
-    cells["q"], wraps = unwrapped(cells["q"], _edges(time, starts)[:-1])
+    runs = _runs(time, starts)
+    cells["q"], wraps = unwrapped(cells["q"], [run.start for run in runs])
     if any(wraps):
         which = ", ".join(f"q{j + 1} ({count} times)" for j, count in enumerate(wraps) if count)
         notes.append(f"angles wrap after a turn: {which}; unwrapped")
     if "v" not in cells:
-        cells["v"] = _differences(time, cells["q"], starts)
+        cells["v"] = central_differences(time, cells["q"], runs)
         notes.append("v: central differences of q, for the source has no velocities")
     unit = (
         "A"
@@ -397,17 +399,8 @@ def _spread(time: Array, starts: Sequence[int]) -> Array:
     return time
 
 
-def _edges(time: Array, starts: Sequence[int]) -> list[int]:
-    """Rows at which a run begins, the first one too, and the number of rows."""
+def _runs(time: Array, starts: Sequence[int]) -> list[slice]:
+    """Rows of each part between its gaps."""
     steps = np.diff(time)
     gaps = np.flatnonzero((steps > GAP_PERIODS * np.median(steps)) | (steps <= 0)) + 1
-    return sorted({0, len(time), *starts, *(int(k) for k in gaps)})
-
-
-def _differences(time: Array, q: Array, starts: Sequence[int]) -> Array:
-    """Central differences within each part and between its gaps, one-sided at the ends: no shift in time."""
-    v = np.zeros_like(q)
-    for first, last in pairwise(_edges(time, starts)):
-        if last - first >= 2:
-            v[first:last] = np.gradient(q[first:last], time[first:last], axis=0)
-    return v
+    return [slice(*edges) for edges in pairwise(sorted({0, len(time), *starts, *(int(k) for k in gaps)}))]
