@@ -9,7 +9,7 @@ import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.laws.effects.base import Estimate, Value, number
-from armloop.laws.effects.onset import passes
+from armloop.laws.effects.spells import Interval, during_any
 from armloop.util.arrays import Array, Mask
 
 
@@ -21,13 +21,9 @@ def during(motion: Motion, parameters: dict[str, Value]) -> Mask:
     """
     start, end = number(parameters["start"]), number(parameters["end"])
     posture = parameters.get("posture")
-    rows = np.zeros(motion.samples, dtype=bool)
-    for run in motion.runs():
-        time = motion.time[run]
-        if posture is not None and not passes(motion, run, start, np.asarray(posture, dtype=float)):
-            continue
-        rows[run] = (time >= start) & (time <= end)
-    return rows
+    if posture is None:
+        return (motion.time >= start) & (motion.time <= end)
+    return during_any(motion, [Interval(start, end, tuple(np.asarray(posture, dtype=float).tolist()))])
 
 
 def ends(parameters: Mapping[str, Estimate]) -> tuple[float, float]:
