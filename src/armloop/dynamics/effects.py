@@ -7,14 +7,14 @@ arrays alone is asked for its torque at samples (:mod:`armloop.dynamics.own_effe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from armloop.dynamics.equations import Array, BodyEquations, Equations, Numbers, Rows
 from armloop.dynamics.own_effects import OwnEffectEquations
-from armloop.laws.effects import Value, effect
+from armloop.laws.effects import Values, effect
 from armloop.laws.effects.base import Placed
 from armloop.laws.friction import Sliding, torque_along
 from armloop.robot.arm import Arm
@@ -84,7 +84,7 @@ def effect_law(
     arm: Arm,
     name: str,
     joint: int | None,
-    parameters: Mapping[str, Value],
+    parameters: Values,
     functions: Functions,
     inertial: Array | None = None,
     other_joint: int | None = None,

@@ -6,14 +6,13 @@ The listed effects' laws are written out for any kind of number (:mod:`armloop.d
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.dynamics.equations import Array, Equations, Numbers, Rows
-from armloop.laws.effects import Context, Effect, Value
+from armloop.laws.effects import Context, Effect, Values
 from armloop.robot.arm import Arm
 from armloop.util.errors import ModelError
 
@@ -24,9 +23,7 @@ _ROUND_OFF = 1e-6
 class OwnEffectEquations(Equations):
     """tau = M(q) vdot + rest(q, v) of an effect by its torques at samples."""
 
-    def __init__(
-        self, arm: Arm, effect: Effect, parameters: Mapping[str, Value], inertial: Array | None
-    ) -> None:
+    def __init__(self, arm: Arm, effect: Effect, parameters: Values, inertial: Array | None) -> None:
         """Take an effect of the arm.
 
         Raises:

@@ -16,7 +16,7 @@ from armloop.drake.given import joints_for, require_of, require_plant, warn_of_d
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, within
 from armloop.dynamics import effect_law
-from armloop.laws.effects import Value, effect, misplaced, misstated
+from armloop.laws.effects import Values, effect, misplaced, misstated
 from armloop.laws.effects.base import number
 from armloop.laws.friction import Sliding, torque_along
 from armloop.robot.arm import Arm
@@ -53,7 +53,7 @@ def EffectTorque_(T: type) -> Any:
             arm: Arm,
             name: str,
             joint: int | None,
-            parameters: Mapping[str, Value],
+            parameters: Values,
             *,
             other_joint: int | None = None,
             inertial: Any = None,

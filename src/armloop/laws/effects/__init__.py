@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from armloop.laws.effects.base import Context, Effect, Estimate, Parameter, Value
+from armloop.laws.effects.base import Context, Effect, Estimate, Parameter, Value, Values
 from armloop.laws.effects.found import FoundLaw, found_law
 from armloop.laws.effects.law import INERTIA, Law, LinearJointEffect, ProfiledJointEffect
 from armloop.laws.effects.listed import EFFECTS
@@ -33,6 +33,7 @@ __all__ = [
     "Parameter",
     "ProfiledJointEffect",
     "Value",
+    "Values",
     "effect",
     "effect_kind",
     "found_law",

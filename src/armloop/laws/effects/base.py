@@ -27,6 +27,8 @@ from armloop.util.arrays import Array
 from armloop.util.functions import Functions
 
 Value = float | list[float]
+#: Parameters of a law by their names.
+Values = Mapping[str, Value]
 Pointwise = Callable[[Array, Array, Array], Sequence[float] | Array]
 #: Name and joints of an effect: what makes two the same.
 Place = tuple[str, int | None, int | None]
@@ -315,19 +317,19 @@ class Effect(ABC):
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         """(N, n) torque that the drive must supply in addition (or that the sensor adds)."""
 
-    def placed(self, parameters: Mapping[str, Value]) -> Placed | None:
+    def placed(self, parameters: Values) -> Placed | None:
         """The law along its direction, where it has one written for every kind of number."""
         return None
 
-    def of_state(self, arm: Arm, parameters: Mapping[str, Value]) -> StateLaw | None:
+    def of_state(self, arm: Arm, parameters: Values) -> StateLaw | None:
         """The torque as a function of q and v alone, written for every kind of number; None where it is none."""
         return None
 
-    def order(self, parameters: Mapping[str, Value]) -> float:
+    def order(self, parameters: Values) -> float:
         """The highest harmonic of its joint's angle in the torque, where that is higher than a rigid body's; else zero."""
         return 0.0
 
-    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body | None:
+    def body(self, arm: Arm, parameters: Values, inertial: Array | None) -> Body | None:
         """The bodies whose torque it is, where it is one of rigid bodies; ``inertial`` (10 n,) are the model's."""
         return None
 
@@ -352,9 +354,7 @@ class Effect(ABC):
         """What is wrong with parameters beside each other, each of which is right; empty if nothing is."""
         return ""
 
-    def falsified(
-        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
-    ) -> tuple[Array, Array] | None:
+    def falsified(self, time: Array, q: Array, tau: Array, parameters: Values) -> tuple[Array, Array] | None:
         """What a sensor makes of one run's q and tau (N, n), recorded at ``time`` (N,); None where it cannot be told so."""
         return None
 

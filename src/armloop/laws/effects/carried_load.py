@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.motion import Motion
-from armloop.laws.effects.base import Array, Context, Estimate, Value
+from armloop.laws.effects.base import Array, Context, Estimate, Value, Values
 from armloop.laws.effects.payload import Payload, on_the_last_link
 from armloop.laws.effects.spells import Interval, during_any
 from armloop.robot.arm import Arm
@@ -77,7 +77,7 @@ class CarriedLoad(Payload):
         return f"{on_the_last_link(mass, at)}, carried from {when} s"
 
 
-def _intervals(parameters: Mapping[str, Value], n: int) -> list[Interval]:
+def _intervals(parameters: Values, n: int) -> list[Interval]:
     first, last = (np.atleast_1d(np.asarray(parameters[key])) for key in ("picked_up", "put_down"))
     posture = np.asarray(parameters["posture"], dtype=float).reshape(-1, n)
     return [

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Value, less, number
+from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Values, less, number
 from armloop.laws.effects.joint_spring import JointSpring
 from armloop.laws.effects.law import Law
 from armloop.robot.arm import Arm
@@ -90,7 +90,7 @@ class CouplingSpring(Law):
         own = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
         return own, float(x[2]) / own, shape + float(x[1]) / own
 
-    def _numbers(self, parameters: Mapping[str, Value]) -> tuple[tuple[float, ...], float]:
+    def _numbers(self, parameters: Values) -> tuple[tuple[float, ...], float]:
         k, rest, ratio = (number(parameters[p.name]) for p in self.parameters)
         return (k, k * rest), ratio
 

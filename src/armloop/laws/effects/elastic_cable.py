@@ -19,6 +19,7 @@ from armloop.laws.effects.base import (
     Parameter,
     StateLaw,
     Value,
+    Values,
     number,
     with_error,
 )
@@ -101,7 +102,7 @@ class ElasticCable(Effect):
             if p.name != "pushes" or cable.pushes
         }
 
-    def of_state(self, arm: Arm, parameters: Mapping[str, Value]) -> StateLaw:
+    def of_state(self, arm: Arm, parameters: Values) -> StateLaw:
         k, slack, link = (number(parameters[key]) for key in ("stiffness", "slack_length", "link"))
         both = number(parameters.get("pushes", 0.0))
         a, attached = (_vector(parameters[key]) for key in ("anchor", "attached"))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Context, Effect, Estimate, Parameter, Value, number
+from armloop.laws.effects.base import Array, Context, Effect, Estimate, Parameter, Value, Values, number
 from armloop.robot.arm import Arm
 
 
@@ -65,9 +64,7 @@ class EncoderOffset(Effect):
         q[:, self.index] -= offset
         return context.predict(replace(context.motion, q=q))
 
-    def falsified(
-        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
-    ) -> tuple[Array, Array]:
+    def falsified(self, time: Array, q: Array, tau: Array, parameters: Values) -> tuple[Array, Array]:
         q = q.copy()
         q[:, self.index] += number(parameters["offset"])
         return q, tau

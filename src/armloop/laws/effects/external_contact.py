@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
+from armloop.laws.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, Values, number
 from armloop.laws.effects.events import during, ends_before_it_starts
 from armloop.laws.effects.payload import link_parameters
 from armloop.robot.arm import Arm
@@ -50,7 +50,7 @@ class ExternalContact(Effect):
     def fault(cls, parameters: Mapping[str, Any]) -> str:
         return ends_before_it_starts(parameters)
 
-    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
+    def body(self, arm: Arm, parameters: Values, inertial: Array | None) -> Body:
         """-J^T force while it lasts: the weight of a unit mass at the tool whose gravity is the force."""
         mass = link_parameters(arm, {"mass": 1.0, "com": parameters.get("point", [0.0, 0.0, 0.0])})
         force = np.asarray(parameters["force"], dtype=float)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Context, Effect, Estimate, Pointwise, StateLaw, Value, number
+from armloop.laws.effects.base import Array, Context, Effect, Estimate, Pointwise, StateLaw, Values, number
 from armloop.robot.arm import Arm
 from armloop.util.errors import ModelError
 from armloop.util.functions import MATH, NUMPY, Functions
@@ -76,7 +76,7 @@ class FoundLaw(Effect):
         of_terms = [] if self.fault(parameters) else _joints(parameters)
         return [*super().joints(parameters), *(j + 1 for j in of_terms)]
 
-    def of_state(self, arm: Arm, parameters: Mapping[str, Value]) -> StateLaw:
+    def of_state(self, arm: Arm, parameters: Values) -> StateLaw:
         terms = [(_factors(name), number(value)) for name, value in parameters.items() if name not in RANGE]
         within = _range(terms, parameters) if RANGE[0] in parameters else []
 
@@ -95,12 +95,12 @@ class FoundLaw(Effect):
 
         return torque
 
-    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+    def torque(self, context: Context, parameters: Values) -> Array:
         motion = context.motion
         tau = self.of_state(context.arm, parameters)(NUMPY, list(motion.q.T), list(motion.v.T))
         return np.stack([np.broadcast_to(x, motion.samples) for x in tau], axis=1).astype(float)
 
-    def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
+    def pointwise(self, arm: Arm, parameters: Values, inertial: Array | None) -> Pointwise:
         law = self.of_state(arm, parameters)
         return lambda q, v, vdot: law(MATH, q.tolist(), v.tolist())
 
@@ -198,7 +198,7 @@ def _fading(x: Any, middle: float, half: float) -> Any:
 
 
 def _range(
-    terms: Sequence[tuple[tuple[_Factor, ...], float]], parameters: Mapping[str, Value]
+    terms: Sequence[tuple[tuple[_Factor, ...], float]], parameters: Values
 ) -> list[tuple[str, int, float, float]]:
     """Middle and half width of the range of each position and speed that the terms contain."""
     used: dict[tuple[str, int], None] = {}

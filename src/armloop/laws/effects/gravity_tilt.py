@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +14,7 @@ from armloop.laws.effects.base import (
     Estimate,
     Parameter,
     Value,
+    Values,
     number,
     std_errors,
 )
@@ -121,7 +121,7 @@ class GravityTilt(Effect):
             found["first_moment"] = Estimate((axes @ x[2:]).tolist(), errors, "kg*m")
         return found
 
-    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
+    def body(self, arm: Arm, parameters: Values, inertial: Array | None) -> Body:
         if inertial is None:
             raise ModelError("effect gravity_tilt: its law needs the model's inertial parameters")
         tilted = tilted_gravity(arm.gravity, number(parameters["roll"]), number(parameters["pitch"]))
@@ -146,7 +146,7 @@ class GravityTilt(Effect):
         return f"the base is not level: rolled {roll} about x and pitched {pitch} about y"
 
 
-def with_first_moment(arm: Arm, inertial: Array, parameters: Mapping[str, Value]) -> Array:
+def with_first_moment(arm: Arm, inertial: Array, parameters: Values) -> Array:
     """Link parameters (10 n,) with a tilt's first moment of the first turning link, which a level arm does not show."""
     links, (link, _) = np.array(inertial, dtype=float), unshown_axes(arm)
     links[_of(link)] += np.asarray(parameters.get("first_moment", 0.0), dtype=float)

@@ -26,6 +26,7 @@ from armloop.laws.effects.base import (
     Placed,
     Pointwise,
     Value,
+    Values,
     number,
 )
 from armloop.laws.friction import KINDS, Acting, Direction, Element, Sliding, column, torque_along
@@ -94,7 +95,7 @@ class Law(Effect):
             return Direction(self.index)
         return Direction(self.index, self.other_joint - 1, shape)
 
-    def _numbers(self, parameters: Mapping[str, Value]) -> tuple[tuple[float, ...], float]:
+    def _numbers(self, parameters: Values) -> tuple[tuple[float, ...], float]:
         """Coefficients and shape."""
         p = {
             q.name: number(parameters[q.name] if q.default is None else parameters.get(q.name, q.default))
@@ -162,7 +163,7 @@ class Law(Effect):
             total += c * values
         return self._spread(context, total[:, None], shape)[:, :, 0]
 
-    def placed(self, parameters: Mapping[str, Value]) -> Placed | None:
+    def placed(self, parameters: Values) -> Placed | None:
         if not self.elements:
             return None
         coefficients, shape = self._numbers(parameters)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +14,7 @@ from armloop.laws.effects.base import (
     Estimate,
     Parameter,
     Value,
+    Values,
     number,
     std_errors,
 )
@@ -88,7 +88,7 @@ class Payload(Effect):
         J[4:7, 4] = 1.0
         return beta, J
 
-    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
+    def body(self, arm: Arm, parameters: Values, inertial: Array | None) -> Body:
         return Body(np.concatenate([np.zeros(10 * (arm.n - 1)), link_parameters(arm, parameters)]))
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
@@ -166,7 +166,7 @@ def on_the_last_link(mass: Estimate, centre: str) -> str:
     )
 
 
-def link_parameters(arm: Arm, parameters: Mapping[str, Value]) -> Array:
+def link_parameters(arm: Arm, parameters: Values) -> Array:
     """(10,) parameters about the last link's origin, in its frame."""
     mass, com_tool = number(parameters["mass"]), np.asarray(parameters["com"], dtype=float)
     com = arm.X_tool[:3, :3] @ com_tool + arm.X_tool[:3, 3]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Context, Effect, Estimate, Parameter, Value, number
+from armloop.laws.effects.base import Array, Context, Effect, Estimate, Parameter, Value, Values, number
 from armloop.robot.arm import Arm
 
 
@@ -57,9 +57,7 @@ class TimeDelay(Effect):
         assert context.predicted is not None
         return context.predicted
 
-    def falsified(
-        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
-    ) -> tuple[Array, Array]:
+    def falsified(self, time: Array, q: Array, tau: Array, parameters: Values) -> tuple[Array, Array]:
         return q, later(time, tau, number(parameters["seconds"]))
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from armloop.laws.effects.base import Array, Context, Estimate, Value, number
+from armloop.laws.effects.base import Array, Context, Estimate, Value, Values, number
 from armloop.laws.effects.time_delay import TimeDelay, later
 
 
@@ -24,9 +22,7 @@ class TorqueDelay(TimeDelay):
     def recorded(self, context: Context) -> Array:
         return super().recorded(context)[:, [self.index]]
 
-    def falsified(
-        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
-    ) -> tuple[Array, Array]:
+    def falsified(self, time: Array, q: Array, tau: Array, parameters: Values) -> tuple[Array, Array]:
         tau, own = tau.copy(), slice(self.index, self.index + 1)
         tau[:, own] = later(time, tau[:, own], number(parameters["seconds"]))
         return q, tau

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Value, number
+from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Values, number
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
 
@@ -61,9 +61,7 @@ class TorqueDrift(Law):
         # at the longest that is tried it is a straight line, and one of its own
         return number(parameters["time_constant"].value) >= min(tried)
 
-    def falsified(
-        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
-    ) -> tuple[Array, Array]:
+    def falsified(self, time: Array, q: Array, tau: Array, parameters: Values) -> tuple[Array, Array]:
         tau, T = tau.copy(), number(parameters["time_constant"])
         drift = number(parameters["rate"]) * T * -np.expm1(-(time - time[0]) / T)
         tau[:, self.index] += number(parameters["offset"]) + drift

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from armloop.laws.effects.base import Array, Context, Effect, Estimate, Parameter, Value, number
+from armloop.laws.effects.base import Array, Context, Effect, Estimate, Parameter, Value, Values, number
 from armloop.robot.arm import Arm
 
 
@@ -32,9 +31,7 @@ class TorqueGain(Effect):
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         return self.full_columns(context, 0.0)[:, :, 0] * (number(parameters["gain"]) - 1)
 
-    def falsified(
-        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
-    ) -> tuple[Array, Array]:
+    def falsified(self, time: Array, q: Array, tau: Array, parameters: Values) -> tuple[Array, Array]:
         tau = tau.copy()
         tau[:, self.index] *= number(parameters["gain"])
         return q, tau

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from armloop.laws.effects.base import Array, Estimate, Parameter, Value, number
+from armloop.laws.effects.base import Array, Estimate, Parameter, Values, number
 from armloop.laws.effects.law import Law
 
 
@@ -39,9 +38,7 @@ class TorqueOffset(Law):
         ),
     }
 
-    def falsified(
-        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
-    ) -> tuple[Array, Array]:
+    def falsified(self, time: Array, q: Array, tau: Array, parameters: Values) -> tuple[Array, Array]:
         tau = tau.copy()
         tau[:, self.index] += number(parameters["offset"])
         return q, tau

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from armloop.data.motion import Motion
-from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Value, number
+from armloop.laws.effects.base import Array, Context, Estimate, Parameter, Values, number
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
 from armloop.robot.arm import Arm
@@ -109,7 +109,7 @@ class TorqueRipple(Law):
         beside = np.arange(step, 1.0, max(step, self.part))
         return [float(order) for order in np.concatenate([shape - beside[::-1], shape + beside])]
 
-    def order(self, parameters: Mapping[str, Value]) -> float:
+    def order(self, parameters: Values) -> float:
         return number(parameters["order"])
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
