@@ -234,11 +234,8 @@ def _with_payload(link: SpatialInertia, mass: float, com: Array, own: float | No
     tensor = tensor + mass * (float(com @ com) * np.eye(3) - np.outer(com, com)) + own * np.eye(3)
     if total <= 0:
         raise ArmError(f"a payload of {mass:g} kg leaves the last link with a mass of {total:g} kg")
-    G = tensor / total
     try:
-        return SpatialInertia(
-            total, moment / total, UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])
-        )
+        return _spatial_inertia(total, moment / total, tensor)
     except RuntimeError as error:
         reason = " ".join(str(error).split())
         raise ArmError(
