@@ -32,6 +32,18 @@ def test_a_lasting_step_of_one_position_is_a_slip(size: float) -> None:
     assert words.startswith(f"column q2 steps by {slip.size:.3g} at 4 s and stays there, while v2 goes on")
 
 
+def test_what_a_brake_stops_has_not_slipped_and_what_steps_at_rest_has() -> None:
+    log = run(1, 10.0)
+    rest = replace(log, q=log.q.copy(), v=log.v.copy())
+    rest.q[500:, 1], rest.v[500:, 1] = log.q[499, 1], 0.0
+    # where it is faster than it has braked from one sample to the next, it is not where its speed has led
+    braked = replace(rest, q=rest.q + np.where(np.arange(len(rest.q)) < 500, 0.0, -5e-3)[:, None] * [0, 1, 0])
+    assert list(slips(recorded(braked))) == []
+    later = replace(rest, q=rest.q + np.where(np.arange(len(rest.q)) < 700, 0.0, 0.03)[:, None] * [0, 1, 0])
+    (slip,) = slips(recorded(later))
+    assert (slip.joint, slip.row) == (1, 700)
+
+
 def test_a_large_slip_is_refused_with_the_time_and_what_it_is() -> None:
     with pytest.raises(
         LogError, match=r"column q2, row 501 steps by 0\.2 at 4 s and stays there.*slips; correct q2"

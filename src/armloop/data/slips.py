@@ -43,15 +43,19 @@ def slips(log: Recorded) -> Iterator[Slip]:
             continue
         time, q, v = log.time[run], log.q[run], log.v[run]
         left = np.diff(q, axis=0) - 0.5 * (v[1:] + v[:-1]) * np.diff(time)[:, None]
-        found = [(j, k) for j in range(q.shape[1]) if (k := _step(time[1:], left[:, j])) is not None]
+        found = [
+            (j, k) for j in range(q.shape[1]) if (k := _step(time[1:], left[:, j], v[1:, j])) is not None
+        ]
         for j, k in found:
             if not any(other != j and abs(row - k) <= _LASTS for other, row in found):
                 yield Slip(j, run.start + k + 1, float(left[k, j]))
 
 
-def _step(time: Array, left: Array) -> int | None:
-    """Where a position steps by what is left of it (M,) at instants (M,); None where it does not."""
+def _step(time: Array, left: Array, v: Array) -> int | None:
+    """Where a position steps by what is left of it (M,) before samples (M,) of a speed v; None where it does not."""
     k = int(np.argmax(np.abs(left)))
+    if k and v[k - 1] and not v[k + 1 : k + 1 + _LASTS].any():
+        return None  # a brake has stopped it
     size, usual = float(abs(left[k])), float(np.quantile(np.abs(left), 0.95))
     if size < max(_LEAST, _UNUSUAL * usual) or not _LASTS <= k < len(left) - _LASTS:
         return None

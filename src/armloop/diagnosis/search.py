@@ -21,6 +21,7 @@ from armloop.diagnosis.judgement import (
 )
 from armloop.diagnosis.lasting import much_lasts
 from armloop.diagnosis.masking import masked, stand_in
+from armloop.diagnosis.one_way import one_way
 from armloop.diagnosis.outcomes import Found, Outcome, clear, gradual, known_with, others_than, pruned
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Hypotheses, Known, Tried
@@ -101,6 +102,7 @@ class _Search:
                 break
             found, value = others, best
             self.progress(f"likeliest: {', '.join(f.effect.label() for f in found) or 'nothing'}")
+        found = one_way(found, self._known(found).fit)
         outcome = self._settled(found)
         stays = [f.effect for f in outcome.found]
         unclear = [f.effect for f in found if f.effect not in stays]

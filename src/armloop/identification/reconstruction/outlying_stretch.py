@@ -85,8 +85,8 @@ def _line(group: list[Burst], units: Sequence[str]) -> str:
     start, end = min(one.start for one in group), max(one.end for one in group)
     return (
         f"{group[0].name}: from {start:.1f} to {end:.1f} s the model leaves {left}, {times} times the most that it leaves "
-        "there in the rest of the training logs, as where something ran into the arm: cut it out of the training log, or "
-        "diagnose it"
+        "there in the rest of the training logs, as where something ran into the arm or a brake closed: cut it out of the "
+        "training log, or diagnose it"
     )
 
 

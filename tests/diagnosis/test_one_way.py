@@ -1,0 +1,49 @@
+"""An offset as large as more friction of the same joint is friction that grew one way; one that differs is a sensor's."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.one_way import one_way
+from armloop.diagnosis.outcomes import Found
+from armloop.laws.effects import effect
+from armloop.laws.effects.base import Estimate
+from armloop.model import AddedEffect
+
+
+def told(*each: tuple[str, int, float, float]) -> list[tuple[str, int | None]]:
+    """What is found of effects with their joints, values and errors."""
+    added = [
+        AddedEffect(kind := effect(name, joint), {kind.parameters[0].name: Estimate(value, error, "N*m")})
+        for name, joint, value, error in each
+    ]
+    fit: Any = SimpleNamespace(added=lambda: added)
+    shape = Shape.fixed(0.0)
+    return [
+        (f.effect.name, f.effect.joint) for f in one_way([Found(a.effect, shape, 0.5) for a in added], fit)
+    ]
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(
+    ("joint", "level", "error", "one"),
+    [
+        (1, 1.74, 0.41, True),
+        (1, 1.74, 0.5, False),  # what is known so poorly agrees with much
+        (1, 2.40, 0.3, True),
+        (1, 2.50, 0.3, False),
+        (2, 1.74, 0.41, False),
+        (1, -1.74, 0.41, False),
+    ],
+)
+def test_two_that_agree_have_one_cause(sign: int, joint: int, level: float, error: float, one: bool) -> None:
+    found = told(("torque_offset", 1, sign * 1.84, 0.05), ("coulomb_friction", joint, level, error))
+    assert found == [("friction_asymmetry" if one else "torque_offset", 1), ("coulomb_friction", joint)]
+
+
+def test_an_offset_by_itself_and_beside_other_laws_stays() -> None:
+    assert told(("torque_offset", 2, 1.0, 0.1)) == [("torque_offset", 2)]
+    assert told(("torque_offset", 2, 1.0, 0.1), ("viscous_friction", 2, 1.0, 0.1))[0] == ("torque_offset", 2)
+    assert told() == []
