@@ -57,7 +57,7 @@ STATED: dict[str, dict[str, Value]] = {
         "link": 2.0,
     },
     "coupling_spring": {"stiffness": 1.5, "rest": 0.3, "ratio": -0.6},
-    "transmission_coupling": {"inertia": 0.02, "viscous": 0.4, "coulomb": 0.15, "ratio": -1.0},
+    "transmission_coupling": {"inertia": 0.02, "viscous": 0.4, "coulomb": 0.15, "ratio": -1.7},
     "external_contact": {"start": 0.0, "end": 40.0, "force": [3.0, -2.0, 5.0]},
     "external_torque": {"start": 0.0, "end": 40.0, "torque": 2.0},
     "torque_gain": {"gain": 1.1},

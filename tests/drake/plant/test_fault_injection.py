@@ -205,7 +205,7 @@ def test_presliding_hysteresis_remembers_the_path_and_forgets_it_between_motions
     check(runs[0].tau - healthy.tau, expected, MOTION.evaluate(runs[0].time)[1])
 
 
-@pytest.mark.parametrize("ratio", [1.0, -1.0])
+@pytest.mark.parametrize("ratio", [1.0, -1.0, 2.5])
 def test_transmission_coupling(arm, healthy, ratio):
     law = {"inertia": 0.1, "viscous": 0.3, "coulomb": 0.2, "ratio": ratio}
     effect = UndeclaredEffect("transmission_coupling", 2, law, other_joint=3)

@@ -224,8 +224,10 @@ def search(
             among = len(all_of) if effect.periodic else 1
             few = _peaks(own, effect, all_of, context) if effect.periodic else all_of
             found = _best_shape(own, effect, few, context, samples)
-            if found is not None and is_worth(found[1], tried * among) and _plausible(arm, effect, *found):
-                trials.append((effect, {found[0]: None}, found[1], among))
+            if found is not None and is_worth(found[1], tried * among):
+                found = _geared(own, effect, *found, context, samples)
+                if _plausible(arm, effect, *found):
+                    trials.append((effect, {found[0]: None}, found[1], among))
             two = _two_motors(own, effect, all_of, context, samples)
             if two is not None and is_worth(two[1], tried):
                 trials.append((effect, *two, among))
@@ -327,10 +329,23 @@ def _best_shape(
     return best
 
 
+def _geared(
+    own: Projected, effect: Effect, shape: float, trial: Trial, context: Context, samples: Samples
+) -> tuple[float, Trial]:
+    """A shape that an arm may have been built with, with its trial, in place of the usual one if it removes clearly more."""
+    best, least = (shape, trial), trial.removed / _AS_GOOD
+    for _ in range(2):  # coarsely, then finely around the best
+        for other in effect.geared(best[0]):
+            found = own.trial(_smoothed(samples, effect.fixed_columns(context, other)), _NEW, WORTH)
+            if found is not None and found.removed > least and _plausible(context.arm, effect, other, found):
+                best, least = (other, found), found.removed
+    return best
+
+
 def _finer(effect: Effect, trial: Trial, shape: float, shapes: Sequence[float]) -> float:
     """A better shape to first order, within those that are tried if these are several."""
     finer = effect.fixed_refined(trial.coefficients, shape)
-    return float(np.clip(finer, min(shapes), max(shapes))) if len(shapes) > 1 else finer
+    return float(np.clip(finer, min(*shapes, shape), max(*shapes, shape))) if len(shapes) > 1 else finer
 
 
 def _two_motors(

@@ -270,6 +270,10 @@ class Effect(ABC):
         """Values around one of :meth:`shapes` that it stands for unless a run tells them apart; none by default."""
         return ()
 
+    def geared(self, shape: float) -> Sequence[float]:
+        """Values around one of :meth:`shapes` that an arm may have been built with in its place; none by default."""
+        return ()
+
     def refined(self, x: Array, shape: float) -> float:
         """A better value of the nonlinear parameter, once free parameters x (k,) were fitted at ``shape``."""
         return shape
