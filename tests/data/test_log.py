@@ -154,7 +154,14 @@ FAULTS: dict[str, tuple[Callable[[Rows], object], str]] = {
     "infinite": (cell(60, 6, "-inf"), r"column tau2, row 60 \(line 61\): '-inf' is not a finite number"),
     "too large for a double": (cell(5, 1, "1e999"), r"column q1, row 5 \(line 6\): '1e999' is not a"),
     "absurdly large": (cell(5, 1, "1e200"), r"column q1, row 5 \(line 6\): '1e200' is too large a number"),
-    "a short row": (lambda rows: rows[12].pop(), r"row 12 \(line 13\) has 6 cells; it must have 7"),
+    "a short row": (
+        lambda rows: rows[12].pop(),
+        r"row 12 \(line 13\) has 6 cells; it must have 7, one for each name of the header$",
+    ),
+    "a short last row": (
+        lambda rows: rows[-1].pop(),
+        r"has 6 cells; it must have 7, one for each name of the header; the logger may have stopped within this last row",
+    ),
     "a long row": (lambda rows: rows[12].append("1"), r"row 12 \(line 13\) has 8 cells; it must have 7"),
     "time goes back": (
         cell(30, 0, "0.1"),

@@ -14,7 +14,7 @@ import numpy as np
 from armloop.convert.clocks import clock_seconds
 from armloop.convert.recording import Array
 from armloop.convert.units import FACTORS, canonical
-from armloop.data.tables import is_number, other_kind
+from armloop.data.tables import UNFINISHED, is_number, other_kind
 from armloop.util.errors import LogError
 
 _NUMBER = re.compile(
@@ -309,8 +309,9 @@ def _fault(
         if cells != width:
             doubled = separator == "," and cells in (2 * width - 1, 2 * width)
             comma = " (a decimal comma between commas: separate the cells by semicolons)" if doubled else ""
+            unfinished = UNFINISHED if row == len(body) and cells < width else ""
             return LogError(
                 f"{path}: row {row} (line {number}) has {cells} cell{'s' * (cells != 1)}; it must have {width}, as the "
-                f"header says{comma}"
+                f"header says{comma}{unfinished}"
             )
     return LogError(f"{path}: cannot be read as a table ({cause}); write it anew with one kind of separator")

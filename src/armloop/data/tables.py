@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from pyarrow.parquet import ParquetFile
 
 CSV, PARQUET = ".csv", ".parquet"
+#: What may have happened to a last row that is too short.
+UNFINISHED = "; the logger may have stopped within this last row: then delete it"
 #: What a file that is not empty has.
 _FIRST = {CSV: "the first line must name the columns", PARQUET: "a Parquet log has at least a footer"}
 #: First bytes of what is no text, and what to do about it.
@@ -292,15 +294,16 @@ def _some_csv_rows(path: Path, width: int, wanted: list[str], first: int, last: 
 
 def _csv_fault(path: Path, header: Sequence[str], names: Sequence[str], cause: Exception) -> LogError:
     """Find the first row that makes a CSV unreadable and say what is wrong with it."""
-    rows = 0
-    for row, (line, cells) in enumerate(_csv_rows(path)):
+    rows, every = 0, enumerate(_csv_rows(path))
+    for row, (line, cells) in every:
         rows = row
         if row == 0:
             continue
         if len(cells) != len(header):
+            unfinished = UNFINISHED if len(cells) < len(header) and next(every, None) is None else ""
             return LogError(
                 f"{path}: row {row} (line {line}) has {len(cells)} cell{'s' * (len(cells) != 1)}; "
-                f"it must have {len(header)}, one for each name of the header"
+                f"it must have {len(header)}, one for each name of the header{unfinished}"
             )
         for name in names:
             cell = cells[header.index(name)]
