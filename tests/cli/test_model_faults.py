@@ -90,6 +90,10 @@ FAULTS: dict[str, tuple[tuple[object, ...], str]] = {
         (*RECONSTRUCT, GOOD, "--method", "sindy", "--library", "rigid-body"),
         r"'sindy'",
     ),
+    "milliseconds for seconds": (
+        (*RECONSTRUCT, GOOD, "--torque-lag", "9.5"),
+        r"--torque-lag 9.5: a record is late by at most 0.1 s",
+    ),
     "two signal-to-noise ratios": (
         (*RECONSTRUCT, GOOD, "--snr", "60,40"),
         r"--snr 60,40: give three numbers",

@@ -178,6 +178,7 @@ def reconstruct(
     snr: tuple[float, float, float] | None = None,
     max_order: int = Command.max_order,
     cutoff: float | None = Command.cutoff,
+    torque_lag: float | None = Command.torque_lag,
     friction: Sequence[str] | None = None,
     physical: bool = True,
     progress: Progress = silent,
@@ -192,6 +193,7 @@ def reconstruct(
         snr: signal-to-noise ratios in dB of q, v, vdot of samples that are no time series.
         max_order: largest truncation order tried.
         cutoff: low-pass in Hz, 0 for none; by library if None.
+        torque_lag: seconds by which tau is recorded later than q; found in the logs, where it is clear, if None.
         friction: laws that may be chosen with rigid-body and lagrangian; None for all.
         physical: keep M(q) positive definite and friction from driving.
         progress: is told where the work stands.
@@ -201,7 +203,7 @@ def reconstruct(
     """
     require("a word", method=method, estimator=estimator)
     require("a word or None", library=library)
-    require("a finite number or None", penalty=penalty, cutoff=cutoff)
+    require("a finite number or None", penalty=penalty, cutoff=cutoff, torque_lag=torque_lag)
     require("a whole number", max_order=max_order)
     require("True or False", physical=physical)
     require("a function", progress=progress)
@@ -211,13 +213,14 @@ def reconstruct(
     units = {log.tau_unit for log in given}
     if len(units) != 1:
         raise InputError("reconstruct: give logs, all of them with torques or all with currents")
-    Command.checked(max_order=max_order, cutoff=cutoff, penalty=penalty)
+    Command.checked(max_order=max_order, cutoff=cutoff, penalty=penalty, torque_lag=torque_lag)
     options = Options(
         sparse=Sparse(estimator, penalty),
         max_order=max_order,
         physical=physical,
         snr=_ratios(snr, method, library, cutoff),
         friction=_laws(friction),
+        torque_lag=None if torque_lag is None else float(torque_lag),
     )
     conditioning = None if cutoff is None else Conditioning(cutoff_hz=float(cutoff))
     recorded: dict[str, Any] = {"unit": units.pop(), "drive_gains": None}

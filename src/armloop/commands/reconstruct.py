@@ -15,7 +15,7 @@ from armloop.commands.arguments import (
     Recorded,
     processes,
 )
-from armloop.commands.options import flag, option, positive, required
+from armloop.commands.options import flag, option, positive, required, within
 from armloop.util.errors import InputError
 from armloop.util.outputs import take_file
 
@@ -51,6 +51,11 @@ class Reconstruct(Logs, Chain, Recorded, Json):
     )
     max_order: int = MAX_ORDER
     cutoff: float | None = CUTOFF
+    torque_lag: float | None = option(
+        "seconds by which tau is recorded later than q, where that is known, such as the delay of its filter (default: "
+        "found in the logs, where it is clear)",
+        check=within(-0.1, 0.1, "a record is late by at most 0.1 s"),
+    )
     coefficients: bool = flag("print every coefficient with its standard error, too")
     friction: str | None = option(
         "friction laws that may be chosen with rigid-body and lagrangian, such as coulomb,viscous: coulomb, coulomb_fading "
@@ -126,6 +131,7 @@ def run(options: Reconstruct) -> None:
                 physical=not options.no_physical,
                 snr=snr,
                 friction=None if names is None else tuple(filter(None, names)),
+                torque_lag=options.torque_lag,
             ),
             progress(options),
             recorded,

@@ -161,6 +161,29 @@ def test_the_model_is_of_the_arm_and_says_that_the_record_is_late(tmp_path: Path
     assert load_model(tmp_path / "model.json").conditioning == how
 
 
+def test_a_lag_that_is_stated_is_taken_as_it_is() -> None:
+    """Of one log of a joint that hardly tells it, as of one of which nobody knows whether it is in step."""
+    stated = reconstruct(
+        [recorded(1, 0.02)],
+        three_axis(),
+        library="rigid-body",
+        options=Options(parts=False, torque_lag=0.02),
+    )
+    assert stated.model.conditioning.torque_lag == 0.02
+    assert "the torque is recorded 20 ms later than the motion, as stated: it is moved back" in " ".join(
+        stated.notes
+    )
+    none = reconstruct(
+        [recorded(1, 0.02)],
+        three_axis(),
+        library="rigid-body",
+        options=Options(parts=False, torque_lag=0.0, standard_errors=False),
+    )
+    assert none.model.conditioning.torque_lag == 0.0 and not any("recorded" in note for note in none.notes)
+    left = [max(made.held_out.moving["rmse"]) for made in (stated, none)]
+    assert left[0] < 0.5 * left[1]
+
+
 def test_a_late_record_asks_for_no_lower_corner() -> None:
     """As recorded, 50 ms of delay leave so much that a filter which takes most of the motion away leaves less."""
     late = [recorded(seed, 0.05) for seed in (1, 2)]

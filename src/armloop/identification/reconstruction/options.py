@@ -31,6 +31,8 @@ class Options:
         insist: keep M(q) positive definite even then.
         standard_errors: estimate those of the coefficients, which takes longer than the coefficients do.
         parts: tell what of the residual a flexible regression still predicts.
+        torque_lag: seconds by which the torque is recorded later than the motion; None where nobody knows, and it is looked
+            for.
     """
 
     sparse: Sparse = field(default_factory=Sparse)
@@ -46,6 +48,7 @@ class Options:
     insist: bool = False
     standard_errors: bool = True
     parts: bool = True
+    torque_lag: float | None = None
 
     @property
     def of_double_feature_set(self) -> bool:

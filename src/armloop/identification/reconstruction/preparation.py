@@ -111,7 +111,8 @@ def prepared(
         beside: what is known of the arm where the torque's lag is looked for.
     """
     runs = kept or logs
-    late, corners = None, set[float]()
+    known = options.torque_lag
+    late, corners = None if known is None else TorqueLag.known(known, arm.n), set[float]()
     while True:
         lag = late.seconds if late else 0.0
         bandwidth, blocks = _filter_and_blocks(
@@ -120,7 +121,7 @@ def prepared(
         dealt = replace(options, block_seconds=blocks.seconds, correlation_seconds=blocks.correlation)
         filters = sorted({given or bandwidth.suited(one) for one in usual}, key=astuple)
         aside = held_out_intervals(runs, filters, dealt) if bandwidth.cutoff_hz > 0 else []
-        if bandwidth.cutoff_hz in {0.0, *corners} or not corrected:
+        if bandwidth.cutoff_hz in {0.0, *corners} or not corrected or known is not None:
             break
         corners.add(bandwidth.cutoff_hz)
         progress("whether the torque is in step with the motion")

@@ -123,11 +123,21 @@ class TorqueLag:
         own = [float(x) if np.isfinite(x) else None for x in self.joints]
         return {"seconds": self.seconds, "std_error": self.std_error, "joints": own}
 
+    @staticmethod
+    def known(seconds: float, n: int) -> TorqueLag:
+        """A lag that somebody has stated of a record of n joints."""
+        return TorqueLag(seconds, 0.0, np.full(n, np.nan), np.inf)
+
     def notes(self) -> list[str]:
-        """What was found, and what is done about it."""
+        """What was found, or stated, and what is done about it."""
         if not self.seconds:
             return []
         way = "later" if self.seconds > 0 else "earlier"
+        if not self.std_error:
+            return [
+                f"the torque is recorded {1e3 * abs(self.seconds):.3g} ms {way} than the motion, as stated: it is moved "
+                "back, here and in logs that the model judges"
+            ]
         return [
             f"the torque is recorded {1e3 * abs(self.seconds):.2g} ± {1e3 * self.std_error:.1g} ms {way} than the motion, "
             "at all joints alike: the recording, not the arm. It is moved back, here and in logs that the model judges"
