@@ -32,6 +32,7 @@ from armloop.diagnosis import (
     evidence,
     innovations,
     judgement,
+    outcomes,
     reversals,
     search,
     unlisted,
@@ -84,11 +85,6 @@ RULES = [
         (innovations, "shared_dry"),
     ),
     _rule(
-        "how a run begins is not judged",
-        lambda s: np.zeros(len(s.tau), dtype=bool),
-        (evidence, "starting"),
-    ),
-    _rule(
         "joints that turn round tell nothing of an event",
         lambda m, x: np.zeros_like(x),
         (contacts, "turning"),
@@ -126,7 +122,10 @@ RULES = [
         (unlisted, "enough"),
     ),
     _rule("or than what looks like it", lambda *_: False, (judgement, "exceeds_null")),
-    _rule("twice that for a law that ties two joints", lambda effect: 1, (search, "_tied")),
+    _rule("twice that for a law that ties two joints", lambda effect: 1, (outcomes, "_tied")),
+    _rule(
+        "an offset as large as more friction is of one cause", lambda found, fit: found, (search, "one_way")
+    ),
     _rule("a coefficient is clear", lambda e, outcome: outcome, (search, "clear")),
     _rule("the likelihood ratio counts too", lambda *_: -np.inf, (judgement, "_likelier")),
     _rule("effects beside a law must be worth it", lambda e, outcome: outcome, (unlisted, "pruned")),

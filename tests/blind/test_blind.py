@@ -125,6 +125,15 @@ def test_finished_loops_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert sorted(made.read_text().split()) == ["1", "2", "3", "3"]
 
 
+def test_what_is_left_out_rule_by_rule_is_there() -> None:
+    import ablate
+
+    gone = [
+        (rule.name, name) for rule in ablate.RULES for place, name in rule.places if not hasattr(place, name)
+    ]
+    assert gone == []
+
+
 def test_the_judging_process_imports_nothing_of_the_generator() -> None:
     tree = ast.parse((HERE / "verdicts.py").read_text(encoding="utf-8"))
     names = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
