@@ -162,6 +162,10 @@ FAULTS: dict[str, tuple[Callable[[Rows], object], str]] = {
         lambda rows: rows[-1].pop(),
         r"has 6 cells; it must have 7, one for each name of the header; the logger may have stopped within this last row",
     ),
+    "a long last row": (
+        lambda rows: rows[-1].append("1"),
+        r"has 8 cells; it must have 7, one for each name of the header$",
+    ),
     "a long row": (lambda rows: rows[12].append("1"), r"row 12 \(line 13\) has 8 cells; it must have 7"),
     "time goes back": (
         cell(30, 0, "0.1"),

@@ -3,8 +3,12 @@
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+from rubbing_arm import model_with_baseline, motion_of, torque
+from synthetic import measured
 
+from armloop.diagnosis import diagnose
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.one_way import one_way
 from armloop.diagnosis.outcomes import Found
@@ -47,3 +51,18 @@ def test_an_offset_by_itself_and_beside_other_laws_stays() -> None:
     assert told(("torque_offset", 2, 1.0, 0.1)) == [("torque_offset", 2)]
     assert told(("torque_offset", 2, 1.0, 0.1), ("viscous_friction", 2, 1.0, 0.1))[0] == ("torque_offset", 2)
     assert told() == []
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_friction_that_grew_one_way_is_told_with_the_sensor_as_its_alternative(way: int) -> None:
+    """0.5 N·m more at joint 2 in one direction: half of it as friction of both, and half as a constant."""
+    motion = motion_of(7, 40.0)
+    grown = 0.25 * (np.tanh(motion.v / 1e-4) + way) * np.eye(3)[1]
+    found = diagnose(model_with_baseline(), [measured(motion, torque(motion) + grown, 7, 0.01)], jobs=1)
+    assert sorted(found.named) == [("coulomb_friction", 2), ("friction_asymmetry", 2)]
+    told = {effect["effect"]: effect for effect in found.to_dict()["effects"]}
+    for name, sign in (("coulomb_friction", 1), ("friction_asymmetry", way)):
+        level = told[name]["parameters"]["level"]
+        assert abs(level["value"] - sign * 0.25) < 4 * level["std_error"]
+    alternatives = [(one["effect"], one["joint"]) for one in told["friction_asymmetry"]["alternatives"]]
+    assert ("torque_offset", 2) in alternatives

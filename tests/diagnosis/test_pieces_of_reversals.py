@@ -211,7 +211,7 @@ def test_positive_is_three_standard_errors_by_students_t(count: int) -> None:
 
 
 #: To which share each effect lowers the error of its joint.
-LEFT = {"memory 1": 0.3, "memory 2": 0.4, "weak 1": 0.9}
+LEFT = {"memory 1": 0.3, "memory 2": 0.4, "weak 1": 0.9, "other 2": 0.48}
 
 
 def of(effects: tuple[Any, ...]) -> Any:
@@ -312,6 +312,17 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     assert found.after == pytest.approx([0.6, 3.0])
     unclear.add(("memory", 1))
     assert judge_reversals(run(nobody), outcome, everybody, told.append) is None
+    # what is none beside another, though it was one before that was found, makes way for the next
+    unclear.clear()
+    every.append(Effect("other", 2))
+    monkeypatch.setattr(
+        Known,
+        "trial",
+        lambda self, e: None if e == every[1] and self.fit.effects else of((*self.fit.effects, e)),
+    )
+    found = judge_reversals(run(nobody), outcome, everybody, told.append)
+    assert found is not None
+    assert [(one.effect.name, one.effect.joint) for one in found.found] == [("memory", 1), ("other", 2)]
     # nothing at all where nothing may count
     none = np.zeros((6, 2), dtype=bool)
     assert judge_reversals(run(none), outcome, none, told.append) is None

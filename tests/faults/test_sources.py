@@ -93,6 +93,19 @@ SOURCES: dict[str, tuple[Lay, str, str]] = {
         f"bad.csv{SAID}",
         r"has 8 cells; it must have 4, as the header says \(a decimal comma between commas",
     ),
+    "a row that lacks a cell": (
+        lambda place: (
+            table()(place),
+            (bad := place / "bad.csv").write_text(
+                "\n".join(
+                    line.rpartition(",")[0] if k == 50 else line
+                    for k, line in enumerate(bad.read_text().splitlines())
+                )
+            ),
+        ),
+        f"bad.csv{SAID}",
+        r"row 50 \(line 51\) has 3 cells; it must have 4, as the header says$",
+    ),
     "a row that breaks off": (
         lambda place: (table()(place), (place / "bad.csv").open("a").write("1")),
         f"bad.csv{SAID}",

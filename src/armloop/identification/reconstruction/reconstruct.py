@@ -259,7 +259,7 @@ def _chosen(libraries: Sequence[Contender]) -> Attempt:
 
 def _in_step(ready: Prepared, tried: Attempt, preparing: Callable[..., Prepared]) -> Prepared | None:
     """The logs with another lag of their torque, beside friction and ripples found; None where it is felt to be the same."""
-    if not ready.late or ready.options.torque_lag is not None:
+    if not ready.late:
         return None
     again = preparing(beside=Beside(ripples(tried.found.effects), tried.found.friction))
     return again if abs(again.late - ready.late) * tried.conditioning.cutoff_hz >= FELT else None
