@@ -312,17 +312,13 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     assert found.after == pytest.approx([0.6, 3.0])
     unclear.add(("memory", 1))
     assert judge_reversals(run(nobody), outcome, everybody, told.append) is None
-    # what is none beside another, though it was one before that was found, makes way for the next
+    # what is none beside another that was found since makes way for the next
     unclear.clear()
     every.append(Effect("other", 2))
-    monkeypatch.setattr(
-        Known,
-        "trial",
-        lambda self, e: None if e == every[1] and self.fit.effects else of((*self.fit.effects, e)),
-    )
+    trial = Known.trial
+    monkeypatch.setattr(Known, "trial", lambda k, e: None if e == every[1] and k.fit.effects else trial(k, e))
     found = judge_reversals(run(nobody), outcome, everybody, told.append)
-    assert found is not None
-    assert [(one.effect.name, one.effect.joint) for one in found.found] == [("memory", 1), ("other", 2)]
+    assert found is not None and [one.effect.name for one in found.found] == ["memory", "other"]
     # nothing at all where nothing may count
     none = np.zeros((6, 2), dtype=bool)
     assert judge_reversals(run(none), outcome, none, told.append) is None

@@ -71,26 +71,6 @@ def test_a_bare_arm_has_none(seed: int) -> None:
     assert named(made([], seed)) == []
 
 
-@pytest.mark.parametrize("ratio", [5.2, pytest.param(-0.3, marks=pytest.mark.long)])
-def test_a_motor_of_one_joint_that_the_other_turns_a_little_has_that_ratio(ratio: float) -> None:
-    """As in the wrist of a Puma, whose last motor turns with v6 + 0.18 v5."""
-    parts = {"inertia": 0.05, "viscous": 0.3, "coulomb": 0.5}
-    size = max(1.0, abs(ratio))
-
-    def geared(motion: Motion) -> Array:
-        w, rate = (x[:, 1] / size + ratio / size * x[:, 2] for x in (motion.v, motion.vdot))
-        torque = parts["inertia"] * rate + parts["viscous"] * w + parts["coulomb"] * np.sign(w)
-        return np.outer(torque, [0, 1 / size, ratio / size])
-
-    (added,) = made([geared]).model.effects
-    assert added.effect.place == ("transmission_coupling", 2, 3)
-    assert added.parameters["ratio"].value == pytest.approx(ratio, rel=0.04)
-    assert np.isnan(added.parameters["ratio"].std_error)
-    # per unit of w = v2 + r v3; of the ratio's error each has its part
-    for key, power in (("inertia", 2), ("viscous", 2), ("coulomb", 1)):
-        assert added.parameters[key].value == pytest.approx(parts[key] / size**power, rel=0.1), key
-
-
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_a_coupling_is_found_in_the_training_data(seed: int) -> None:
     found = of_coupled(seed)

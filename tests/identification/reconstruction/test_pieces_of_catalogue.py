@@ -157,34 +157,3 @@ def test_a_shape_is_refined_within_those_tried_or_freely_from_one(shapes: list[f
     nothing: Any = None
     found = catalogue._best_shape(own, law, shapes, nothing, samples)
     assert found is not None and found[0] == best
-
-
-@pytest.mark.parametrize(
-    ("removed", "best"),
-    [
-        ({1.0: 8.0, 3.0: 10.0, 2.0: 9.5}, 3.0),
-        (
-            {1.0: 8.0, 3.0: 8.8, 2.0: 8.8},
-            1.0,
-        ),  # nine tenths of it are as good: an arm's gears are mostly even
-        ({1.0: 8.0, -4.0: 20.0, 2.0: 10.0}, 2.0),  # what removes more is no motor
-        ({1.0: 8.0, 3.0: 10.0, 3.1: 11.0}, 3.1),
-    ],
-)
-def test_a_ratio_of_gears_is_even_unless_another_removes_clearly_more(
-    removed: dict[float, float], best: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(catalogue, "_smoothed", lambda samples, columns: columns)
-    monkeypatch.setattr(catalogue, "_plausible", lambda arm, effect, shape, found: shape > 0)
-    law: Any = SimpleNamespace(
-        fixed_columns=lambda context, shape: shape,
-        geared=lambda shape: [x for x in removed if x != 1.0] if shape == 1.0 else [shape, 3.1],
-    )
-    own: Any = SimpleNamespace(
-        trial=lambda shape, new, worth: SimpleNamespace(removed=removed[shape]) if shape in removed else None
-    )
-    context: Any = SimpleNamespace(arm=None)
-    nothing: Any = None
-    first: Any = SimpleNamespace(removed=removed[1.0])
-    shape, trial = catalogue._geared(own, law, 1.0, first, context, nothing)
-    assert shape == best and trial.removed == removed[best]
