@@ -1,7 +1,8 @@
 """What a Coulomb and viscous model of a measured arm lacks is friction with memory, which shows at reversals.
 
 What came out: UR10e, log left out: joints 1, 4, 5 and 6, RMS error at their reversals 0.42, 0.34, 0.29 and 0.37
-of what it was (joint 2 turns around four times, where its load tells more; of joint 3 it is not plain). Panda: joints 5 and 7, 0.54 and 0.12.
+of what it was (joint 2 turns around four times, where its load tells more; of joint 3 it is not plain). Panda: joints 5
+and 7, 0.54 and 0.12.
 Among samples that slide, the error of the UR10e's model with all laws is 0.74 of this model's: it cannot be halved there.
 """
 
