@@ -39,6 +39,11 @@ def test_what_a_brake_stops_has_not_slipped_and_what_steps_at_rest_has() -> None
     # where it is faster than it has braked from one sample to the next, it is not where its speed has led
     braked = replace(rest, q=rest.q + np.where(np.arange(len(rest.q)) < 500, 0.0, -5e-3)[:, None] * [0, 1, 0])
     assert list(slips(recorded(braked))) == []
+    # what slipped before it braked is told all the same
+    both = replace(
+        braked, q=braked.q + np.where(np.arange(len(rest.q)) < 200, 0.0, 2e-3)[:, None] * [0, 1, 0]
+    )
+    assert [slip.row for slip in slips(recorded(both))] == [200]
     later = replace(rest, q=rest.q + np.where(np.arange(len(rest.q)) < 700, 0.0, 0.03)[:, None] * [0, 1, 0])
     (slip,) = slips(recorded(later))
     assert (slip.joint, slip.row) == (1, 700)

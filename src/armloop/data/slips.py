@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from armloop.data.recorded import Recorded
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 #: A step of q beyond ∫v dt, rad or m, from which on it is one: what rounds and lags is less from sample to sample.
 _LEAST = 1e-3
@@ -53,9 +54,8 @@ def slips(log: Recorded) -> Iterator[Slip]:
 
 def _step(time: Array, left: Array, v: Array) -> int | None:
     """Where a position steps by what is left of it (M,) before samples (M,) of a speed v; None where it does not."""
+    left = np.where(_braked(v), 0.0, left)
     k = int(np.argmax(np.abs(left)))
-    if k and v[k - 1] and not v[k + 1 : k + 1 + _LASTS].any():
-        return None  # a brake has stopped it
     size, usual = float(abs(left[k])), float(np.quantile(np.abs(left), 0.95))
     if size < max(_LEAST, _UNUSUAL * usual) or not _LASTS <= k < len(left) - _LASTS:
         return None
@@ -63,3 +63,10 @@ def _step(time: Array, left: Array, v: Array) -> int | None:
     near[k] = False
     # what is repaired by the next samples, such as a lost one, is followed by steps as large
     return k if size >= _NEARBY * np.abs(left[near]).max(initial=0.0) else None
+
+
+def _braked(v: Array) -> Mask:
+    """(M,) samples at which a joint has stopped for good from one to the next, as where a brake closes."""
+    still = np.pad(v == 0, (0, _LASTS + 1))
+    after = sliding_window_view(still, _LASTS)[1 : len(v) + 1]
+    return np.append(False, v[:-1] != 0) & after.all(axis=1)

@@ -15,7 +15,7 @@ from armloop.diagnosis.fit import Fit
 from armloop.diagnosis.judgement import CHANCE
 from armloop.diagnosis.outcomes import Found
 from armloop.laws.effects import effect
-from armloop.laws.effects.base import Estimate
+from armloop.laws.effects.base import Estimate, number
 from armloop.laws.effects.coulomb_friction import CoulombFriction
 from armloop.laws.effects.friction_asymmetry import FrictionAsymmetry
 from armloop.laws.effects.torque_offset import TorqueOffset
@@ -44,9 +44,5 @@ def _one(offset: Estimate, level: Estimate | None) -> bool:
     """Whether an offset, of either sign, and more dry friction are one number."""
     if level is None:
         return False
-    constant, friction = (
-        abs(np.array([offset.value, offset.std_error])),
-        np.array([level.value, level.std_error]),
-    )
-    error = float(np.hypot(constant[1], friction[1]))
-    return bool(abs(constant[0] - friction[0]) <= CHANCE * error and error <= _KNOWN * friction[0])
+    friction, error = number(level.value), float(np.hypot(number(offset.std_error), number(level.std_error)))
+    return abs(abs(number(offset.value)) - friction) <= CHANCE * error and error <= _KNOWN * friction

@@ -59,7 +59,8 @@ def search(
         panel: who tries the hypotheses; in this process by default.
         barred: effects that are not asked about.
     """
-    return _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1), barred).outcome()
+    searching = _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1), barred)
+    return searching.of_one_cause(searching.outcome())
 
 
 def log_posterior(evidence: Evidence, score: Score, effects: Sequence[Effect]) -> float:
@@ -102,7 +103,6 @@ class _Search:
                 break
             found, value = others, best
             self.progress(f"likeliest: {', '.join(f.effect.label() for f in found) or 'nothing'}")
-        found = one_way(found, self._known(found).fit)
         outcome = self._settled(found)
         stays = [f.effect for f in outcome.found]
         unclear = [f.effect for f in found if f.effect not in stays]
@@ -125,6 +125,14 @@ class _Search:
             if likely > value + _LEAST and len((again := self._settled(more)).found) == len(more):
                 return replace(again, masked=outcome.masked)
         return outcome
+
+    def of_one_cause(self, outcome: Outcome) -> Outcome:
+        """The same with one cause in the place of two that agree, where it is stated as they are."""
+        found = one_way(outcome.found, outcome.after)
+        if found == outcome.found:
+            return outcome
+        again = self._settled(found)
+        return replace(again, masked=outcome.masked) if len(again.found) == len(found) else outcome
 
     def _without_stand_ins(self, outcome: Outcome, before: list[Found], masking: list[Found]) -> Outcome:
         """The outcome of a search without effects that are none beside what the model itself may err by."""

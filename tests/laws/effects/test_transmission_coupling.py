@@ -38,6 +38,7 @@ def test_the_motor_sees_the_sum_or_the_difference() -> None:
 def test_what_an_arm_was_built_with_may_be_any_ratio_and_has_no_error() -> None:
     made = effect("transmission_coupling", 1, 2)
     coarse, fine = made.geared(-1.0), made.geared(-5.0)
+    assert {1.0, -1.0} <= {*coarse}
     assert (
         min(coarse) == pytest.approx(-8)
         and max(coarse) == pytest.approx(8)

@@ -48,8 +48,8 @@ class TransmissionCoupling(Law):
     def geared(self, shape: float) -> Sequence[float]:
         if abs(shape) != 1:
             return [float(shape * x) for x in np.linspace(0.92, 1.08, 17)]
-        sizes = np.geomspace(1 / self.farthest, self.farthest, 25)
-        return [float(sign * x) for sign in (1, -1) for x in sizes]
+        more = self.farthest ** (np.arange(1, 13) / 12)
+        return [float(sign * x) for sign in (1, -1) for x in (1.0, *more, *(1 / more))]
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         found = super().estimates(arm, x, covariance, shape)
