@@ -8,7 +8,7 @@ import pytest
 from rubbing_arm import model_with_baseline, motion_of, torque
 from synthetic import measured
 
-from armloop.diagnosis import diagnose
+from armloop.diagnosis import diagnose, search
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.one_way import one_way
 from armloop.diagnosis.outcomes import Found
@@ -66,3 +66,21 @@ def test_friction_that_grew_one_way_is_told_with_the_sensor_as_its_alternative(w
         assert abs(level["value"] - sign * 0.25) < 4 * level["std_error"]
     alternatives = [(one["effect"], one["joint"]) for one in told["friction_asymmetry"]["alternatives"]]
     assert ("torque_offset", 2) in alternatives
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_one_cause_is_told_where_it_is_stated_as_the_two_were(
+    stays: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And what is masked by the model's own errors stays so."""
+    told_again: Any = SimpleNamespace(place="both")
+    monkeypatch.setattr(search, "one_way", lambda found, fit: [told_again, *found[1:]])
+    monkeypatch.setattr(search, "replace", lambda outcome, masked: (outcome.found, masked))
+    settled: Any = SimpleNamespace(
+        _settled=lambda found: SimpleNamespace(found=found if stays else found[1:], masked=())
+    )
+    before: Any = SimpleNamespace(found=["offset", "friction"], after=None, masked=("hidden",))
+    made: Any = search._Search.of_one_cause(settled, before)
+    assert made == (([told_again, "friction"], ("hidden",)) if stays else before)
+    monkeypatch.setattr(search, "one_way", lambda found, fit: [*found])
+    assert search._Search.of_one_cause(settled, before) is before

@@ -116,6 +116,7 @@ def test_several_joints_at_one_time_are_one_line() -> None:
     later = Burst(0, "a", 2, 3.0, 3.5, 1.0, 4.0)
     units = ["N*m", "N", "N*m"]
     (line,) = doubtful(bursts, units)
+    assert "as where something ran into the arm or a brake closed: cut it out" in line
     left = "the model leaves 7.73 N·m at joint 1 and 9 N at joint 2, 19 and 19 times the most"
     assert line.startswith(f"a: from 1.8 to 2.6 s {left}")
     assert len(doubtful([*bursts, later], units)) == 2
