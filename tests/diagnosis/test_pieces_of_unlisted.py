@@ -160,7 +160,9 @@ class TestLawThatIsNotListed:
                 lambda evidence, outcome, joint: bare if joint == 1 else outcome,
             )
             evidence: Any = SimpleNamespace(
-                scale=np.ones(2), samples=SimpleNamespace(motion=SimpleNamespace(joints=2))
+                scale=np.ones(2),
+                samples=SimpleNamespace(motion=SimpleNamespace(joints=2)),
+                variation=np.array([1.0, 1.5]),
             )
             found_law, after = unlisted.find_law(evidence, with_effects, lambda text: None)  # type: ignore[arg-type]
             assert (found_law is None) == (after is with_effects)
@@ -170,9 +172,10 @@ class TestLawThatIsNotListed:
         assert verdict(101.0, named, []) == "law at joint 2" and asked == [1]
         assert verdict(201.0, named, [], rest=150.0) == "law at joint 2"
         assert verdict(201.0, named, [], rest=151.0) == "effects"
-        # no more than the baseline: asked where several effects left so little
+        # no more than the baseline: asked where several effects left so little; of one, what is more than its worst
         assert verdict(99.0, named, []) == "effects" and asked == [1]
-        assert verdict(100.0, named[:1], []) == "effects" and asked == []
+        assert verdict(150.0, named[:1], []) == "effects" and asked == []
+        assert verdict(151.0, named[:1], []) == "effects" and asked == [1]
         assert verdict(155.0, named, [], "v2") == "effects"  # dry and viscous friction are listed
         # an effect of the whole arm goes with them: a law of one joint cannot take its place
         assert verdict(155.0, [*named, arm], []) == "effects" and asked == []

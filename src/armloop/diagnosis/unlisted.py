@@ -123,8 +123,9 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
 
     Effects that were only the nearest names for a law that is not listed are struck off: those that leave most of
     what they were to explain, and those for which a law of no more parameters explains far more: the latter even if what
-    they leave is no more than the baseline at its worst, for several effects of one joint bend to much. Effects stay that
-    with a law beside them, fitted together, are no more parameters than one law in place of both.
+    they leave is no more than the baseline at its worst, if they are several of one joint, for these bend to much. A single
+    one stays then: what a law removes beside it is what the model lacks on any day. Effects stay that with a law beside
+    them, fitted together, are no more parameters than one law in place of both.
 
     Args:
         outcome: what the search found.
@@ -179,8 +180,9 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
         rows = outcome.after.score.rows[j]
         if not there or len(there) != len(outcome.found) - len(bare.found) or rows < FEWEST:
             continue
-        if outcome.after.score.energy[j] <= rows and len(there) == 1:
-            continue  # no more than the baseline's
+        score = outcome.after.score
+        if len(there) == 1 and score.energy[j] <= enough(evidence, score)[j]:
+            continue  # no more than the baseline at its worst
         progress(f"joint {j + 1}: whether a law that is not listed does better than what was found there")
         law = law_left(evidence, bare.after, j)
         if not _is_simpler(evidence, law, outcome, bare, j):

@@ -82,6 +82,19 @@ def test_priors_are_the_drawings_by_so_many_kilograms() -> None:
     np.testing.assert_allclose(np.linalg.inv(one.precision), covariance, rtol=1e-6, atol=1e-12)
 
 
+def test_of_a_slide_the_motor_adds_a_mass_whatever_the_arms_lengths() -> None:
+    arm = load_arm("scara")
+    base = BaseParameters.of_arm(arm, rotors=True)
+    prior = rigid_body._priors(arm, base, np.zeros(11 * arm.n))["links as in the URDF ± 1 kg"]
+    length = np.mean([np.linalg.norm(X[:3, 3]) for X in arm.X_PF[1:]])
+    unit = np.concatenate(
+        [np.tile([1, *[length] * 3, *[length**2] * 6], arm.n), np.where(arm.revolute, length**2, 1.0)]
+    )
+    assert not arm.revolute.all()
+    covariance = base.grouping @ np.diag(unit**2) @ base.grouping.T
+    np.testing.assert_allclose(np.linalg.inv(prior.precision), covariance, rtol=1e-6, atol=1e-12)
+
+
 def test_of_a_single_joint_what_is_not_known_lies_a_metre_away() -> None:
     arm = load_arm("three_axis", lock={"joint_2": 0.0, "joint_3": 0.0})
     base = BaseParameters.of_arm(arm, rotors=True)

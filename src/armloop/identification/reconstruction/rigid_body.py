@@ -155,7 +155,9 @@ def _priors(arm: Arm, base: BaseParameters, nominal: Array) -> dict[str, Prior]:
     """
     length = np.linalg.norm(arm.X_PF[1:, :3, 3], axis=1).sum() / max(arm.n - 1, 1)
     length = float(length) if length > 0 else 1.0
-    unit = np.concatenate([np.tile([1.0, *[length] * 3, *[length**2] * 6], arm.n), np.full(arm.n, length**2)])
+    # a slide's motor adds a mass, which nothing measures by lengths
+    rotors = np.where(arm.revolute, length**2, 1.0)
+    unit = np.concatenate([np.tile([1.0, *[length] * 3, *[length**2] * 6], arm.n), rotors])
     spread = base.grouping * unit
     precision = np.linalg.inv(spread @ spread.T)
     centre = base.from_full(nominal)
