@@ -166,7 +166,7 @@ def test_a_joint_has_slid_that_travels_far_enough() -> None:
     moving = np.ones((6, 3), dtype=bool)
     moving[3] = False
     q = np.zeros((6, 3))
-    least = evidence._TRAVEL
+    least = evidence.TRAVEL
     q[2] = [least, 0.99 * least, 2 * least]
     q[4:] = q[2]
     q[5, 2] = 4 * least
@@ -232,3 +232,16 @@ def test_within_a_log_its_friction_does_not_differ() -> None:
     own = whole.within_a_log()
     np.testing.assert_allclose(own.scale, [0.4, 2.0, 0.3])
     assert not own.assumed.any() and own.samples is samples and own.within_a_log() is own
+
+
+@pytest.mark.parametrize(
+    ("samples", "counts", "told"), [(1000, 50, True), (1000, 49, False), (5000, 100, True), (5000, 99, False)]
+)
+def test_a_joint_of_which_few_samples_count_is_not_judged(samples: int, counts: int, told: bool) -> None:
+    """A twentieth of those that are no closer than the filter can tell apart, or a hundred."""
+    rows = np.zeros((2 * samples, 2), dtype=bool)
+    rows[:counts, 0] = rows[:, 1] = True
+    every: Any = SimpleNamespace(N=2 * samples)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(evidence, "independent_rows", lambda samples: np.arange(samples.N) % 2 == 0)
+        assert evidence.seldom(every, rows).tolist() == [not told, False]

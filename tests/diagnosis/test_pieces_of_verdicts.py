@@ -172,8 +172,15 @@ class TestReasons:
         words = reasons.too_still(evidence)
         wanted = f"({blocks} blocks of 0.8 s or more; {still}); log at least 7.2 s in which the joints move"
         assert words == (f"too little motion to judge {wanted}" if still else "")
+        # what turns, but slower than in training, or elsewhere, is not still
+        given.v[:, 0] = 0.5
         evidence.rows[:, 0] = False
-        assert "; joints 1, 2 hardly slide)" in reasons.too_still(evidence)
+        words = reasons.too_still(evidence)
+        assert (
+            "; joint 2 hardly slides; joint 1 slides hardly where, and as fast as, the model was trained); log"
+            in words
+        )
+        assert words.endswith(" s in which the joints move, as fast as in training")
 
     def test_too_few_blocks_in_which_all_joints_slide(self) -> None:
         given = motion((100,), 2)
@@ -189,10 +196,12 @@ class TestReasons:
     @staticmethod
     def standing(monkeypatch: pytest.MonkeyPatch, after: Any, **of: Any) -> Any:
         """Three joints with baselines of 0.5 N·m of which twenty samples slide; the model leaves its own 0.75."""
+        turning = SimpleNamespace(v=np.full((50, 3), 0.5))
+        moving = np.ones((50, 3), dtype=bool)
         evidence: Any = SimpleNamespace(
-            samples=SimpleNamespace(tau=np.ones((50, 3)), motion=None, moving=np.ones((50, 3), dtype=bool)),
+            samples=SimpleNamespace(tau=np.ones((50, 3)), motion=turning, moving=moving),
             model=SimpleNamespace(
-                history={}, baseline={"nrmse": [of.get("poor"), None]}, arm=SimpleNamespace(name="arm")
+                history={}, baseline={"nrmse": [of.get("poor"), None]}, arm=SimpleNamespace(name="arm", n=3)
             ),
             context=SimpleNamespace(load=None),
             left_by=lambda model: np.full((50, 3), model),
@@ -210,6 +219,8 @@ class TestReasons:
         monkeypatch.setattr(reasons, "far_outside", lambda motion, ranges: far)
         monkeypatch.setattr(reasons, "too_slow", lambda model, samples: np.zeros((50, 3), dtype=bool))
         monkeypatch.setattr(reasons, "sliding", lambda samples, model: slides)
+        monkeypatch.setattr(reasons, "seldom", lambda samples, rows: np.arange(3) == of.get("seldom"))
+        monkeypatch.setattr(reasons, "sharing", lambda model, j: of.get("shares", []))
         monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
         monkeypatch.setattr(
             reasons,
@@ -274,6 +285,26 @@ class TestReasons:
         for far, unknown in ((40, False), (41, True)):
             words, found = self.standing(monkeypatch, [0.5, None, 0.5], far=far)
             assert len(words) == 1 and "% of joint 3's (8" in words[0] and found is unknown
+
+    def test_why_a_joint_that_turns_all_the_while_is_not_judged(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        words, _ = self.standing(monkeypatch, [0.5, None, 0.5], slides=19, shares=[2])
+        assert words == [
+            "joint 2 turns, but the motor that it shares with joint 3 stands still in this run, and holds what its friction "
+            "may: nothing can be said of it"
+        ]
+        words, _ = self.standing(monkeypatch, [0.5, None, 0.5], slides=20, counts=19, seldom=1)
+        (said,) = words
+        assert said.startswith(
+            "joint 2 turns round as soon as its torque can be told from that of the turn, and slides"
+        )
+        words, _ = self.standing(monkeypatch, [0.5, 0.5, None], seldom=2, far=10)
+        assert len(words) == 1  # that of what lies outside: enough of the joint counts
+        assert reasons._seldom(0, 0.3).startswith(
+            "joint 1 turns round as soon as its torque can be told from that of the turn, or is where it was "
+            "not trained (30%)"
+        )
 
     def test_a_joint_of_which_next_to_nothing_counts_is_said_to_slide_where_it_does(
         self, monkeypatch: pytest.MonkeyPatch

@@ -12,6 +12,7 @@ from answers import answered
 from armloop.drake.control.pid import PidGains
 from armloop.drake.experiments.scenarios import TrackingScenario, load_tracking
 from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.tuning.tuned_loop import along_reference
 from armloop.reports.tuning_tables import verified_table
 from armloop.util.errors import InputWarning
 from armloop.util.progress import silent
@@ -32,10 +33,35 @@ def test_a_comparison_says_that_its_loop_is_not_stable(tmp_path: Path) -> None:
     with pytest.warns(InputWarning, match=says):
         run_scenario(wild(), {}, tmp_path, silent)
     answer = answered((tmp_path / "tracking.json").read_text(), "tracking")
-    assert answer["stable"] is False
+    assert answer["stable"] is False and answer["unstable_at_s"][0] == 0.0
     assert all(
         loop["phase_margin_deg"] is None and loop["sensitivity_peak"] is None for loop in answer["loop"]
     )
+
+
+def test_a_loop_that_is_not_stable_where_its_reference_leads_is_told_of(tmp_path: Path) -> None:
+    """Stretched out the arm is heavier about its second joint than folded; gains that fit the former ring up the latter."""
+    usual = wild()
+    tame = replace(usual, gains=PidGains([80.0] * 3, [8.0] * 3, [5.0, 5.0, 2.0]))
+    answer, _ = run_scenario(tame, {}, None, silent)
+    assert answer["stable"] is True and answer["unstable_at_s"] == []
+
+    def unstable(gains: PidGains) -> list[float]:
+        along = along_reference(usual)
+        return [t for t, one in along.items() if not one.is_stable(gains)]
+
+    for kd in np.geomspace(
+        2.0, 60.0, 200
+    ):  # the postures of a second differ little: the first gain at which one rings up
+        gains = PidGains([80.0] * 3, [8.0] * 3, [5.0, 5.0, float(kd)])
+        times = unstable(gains)
+        if times:
+            break
+    assert 0.0 not in times
+    words = f"where the reference is after {', '.join(f'{t:.3g}' for t in times)} s the loop is not stable"
+    with pytest.warns(InputWarning, match=words):
+        answer, _ = run_scenario(replace(usual, gains=gains), {}, None, silent)
+    assert answer["stable"] is True and answer["unstable_at_s"] == times
 
 
 def test_a_tuning_states_no_margin_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

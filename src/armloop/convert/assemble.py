@@ -10,6 +10,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from armloop.convert.clocks import DAY, through_midnight
 from armloop.convert.joints import doubtful_order, match
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
 from armloop.convert.recording import Array, Recording, some
@@ -369,6 +370,8 @@ def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.int
     name = mapping.time.column or ""
     raw = _cells(recording, name, " for the time", "the time")
     edges = set(recording.starts)
+    factor = FACTORS["time"][canonical(mapping.time.unit or "s", "time") or "s"]
+    raw = through_midnight(raw, DAY / factor)
     step = np.diff(raw, prepend=raw[0] - 1)
     step[list(edges)] = 1.0
     back = np.flatnonzero(step < 0)
@@ -379,7 +382,6 @@ def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.int
             "time must rise; give runs that were recorded one by one as files of their own"
         )
     keep = np.flatnonzero(step > 0)
-    factor = FACTORS["time"][canonical(mapping.time.unit or "s", "time") or "s"]
     starts = [int(k) for k in np.searchsorted(keep, sorted(edges))]
     return (raw[keep] - raw[0]) * factor, keep, starts
 

@@ -12,8 +12,8 @@ from armloop.convert.recording import Array
 from armloop.data.log import GAP_PERIODS
 
 # A date in whatever order, or none, and a time of day: 31.03.2024 23:59:58,25, 3/31/2024 11:59:58 PM, 23:59:58.250.
-_TIME_OF_DAY = re.compile(r"(?:([\d./-]+)[T ] ?)?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?) ?([AaPp]\.?[Mm]\.?)?")
-_DAY, _HOUR = 86400.0, 3600.0
+_TIME_OFDAY = re.compile(r"(?:([\d./-]+)[T ] ?)?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?) ?([AaPp]\.?[Mm]\.?)?")
+DAY, _HOUR = 86400.0, 3600.0
 _COUNTED = "dates or times of day, counted in s from the first row"
 # A stamp in two columns, as ROS has it: header.stamp.sec and header.stamp.nanosec.
 _SECONDS, _REST = re.compile(r"(.*?)[._/]?secs?$"), r"[._/]?n(?:ano)?secs?"
@@ -67,7 +67,7 @@ def _of_texts(texts: Sequence[str]) -> Array | None:
     seconds = np.empty(len(texts))
     dates = []
     for row, text in enumerate(texts):
-        found = _TIME_OF_DAY.fullmatch(text.strip())
+        found = _TIME_OFDAY.fullmatch(text.strip())
         if found is None:
             return None
         date, hours, minutes, rest, half = found.groups()
@@ -77,12 +77,22 @@ def _of_texts(texts: Sequence[str]) -> Array | None:
     if not any(dates):
         return _past_midnight(seconds - seconds[0])
     days = np.cumsum([0, *(one != other for one, other in zip(dates[1:], dates[:-1], strict=True))])
-    return np.asarray(seconds - seconds[0] + _DAY * days)
+    return np.asarray(seconds - seconds[0] + DAY * days)
 
 
 def _past_midnight(seconds: Array) -> Array:
     """Times of day that go on past midnight, where they fall by more than half a day."""
-    return np.asarray(seconds + _DAY * np.cumsum(np.diff(seconds, prepend=seconds[:1]) < -0.5 * _DAY))
+    return np.asarray(seconds + DAY * np.cumsum(np.diff(seconds, prepend=seconds[:1]) < -0.5 * DAY))
+
+
+def through_midnight(numbers: Array, day: float) -> Array:
+    """(N,) numbers of a clock that begins anew each day as if it went on, if a day later each fall is the step of a run."""
+    step = np.diff(numbers, prepend=numbers[:1])
+    longest = GAP_PERIODS * float(np.median(step[step > 0])) if (step > 0).any() else 0.0
+    falls = step < 0
+    if longest >= 0.5 * day or not (np.abs(step[falls] + day - 0.5 * longest) <= 0.5 * longest).all():
+        return numbers
+    return np.asarray(numbers + day * np.cumsum(falls))
 
 
 def _through_summer_time(seconds: Array) -> tuple[Array, str]:

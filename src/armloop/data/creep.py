@@ -11,6 +11,8 @@ from armloop.util.arrays import Array, Mask
 CREEPING = 0.05
 #: A joint slower than this, rad/s or m/s, may stick, or be shaken by others.
 STICKING = 0.01
+#: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
+TRAVEL = 2e-3
 
 
 def may_stick(fastest: Array) -> Array:

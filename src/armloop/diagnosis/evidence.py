@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves, widened
-from armloop.data.creep import may_stick
+from armloop.data.creep import TRAVEL, may_stick
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.scoring import filtered_context, residual, too_slow
+from armloop.identification.shared_motors import without_shared_standstill
 from armloop.identification.uncertainty import friction_spread, torque_errors
 from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.base import Place
@@ -34,10 +35,11 @@ from armloop.util.interpolation import cubic_nodes
 FOLDS = 2
 #: The shortest block, s, lies between these, so that the model's residual remembers no more than this part of it.
 _SHORTEST, _REMEMBERED = (0.75, 1.0), 0.1
-#: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
-_TRAVEL = 2e-3
 #: Below this part of its largest speed a joint may be at rest, pushed about within its friction.
 STILL = 0.01
+#: A joint of which less than this part of the samples counts is judged by so many of them at least: of one
+#: that turns round as soon as the filter has settled, a law would be fitted to a few moments of its fastest swings.
+_SELDOM, _ENOUGH = 0.05, 100
 #: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
 FEWEST_BLOCKS = 8
 #: Places of a joint (low, middle, high), and speeds (back, slow, forth), that make the cells of its motion.
@@ -122,9 +124,11 @@ class Evidence:
         variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
         blocks = block_numbers(samples.motion, _block_seconds(samples.motion, shortest_block(model)))
         context = filtered_context(model, samples, effects)
+        samples = without_shared_standstill(samples, model, scale)
         rows = sliding(samples, model)
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples)
         rows &= ~samples.at_an_end[:, None]
+        rows &= ~seldom(samples, rows)
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(
             model, samples, scale, variation, rows, blocks, context, asked, unknown, assumed=assumed
@@ -330,6 +334,12 @@ def far_outside(motion: Motion, ranges: Any) -> Mask:
     return np.asarray(np.any([np.abs(x) > FAR * np.maximum(size, 1e-9) for x, size in parts], axis=0))
 
 
+def seldom(samples: Samples, rows: Mask) -> Mask:
+    """(n,) joints of which so few samples (N, n) count that what they show there may be anything of their turns."""
+    every = np.count_nonzero(independent_rows(samples))
+    return np.asarray(rows.sum(axis=0) < min(_ENOUGH, _SELDOM * every))
+
+
 def near_standstill(samples: Samples) -> Mask:
     """(N, n) samples within the filter's reach of one in which a joint does not count as moving."""
     return widened(~samples.moving, samples.motion, round(samples.reach / samples.period))
@@ -347,7 +357,7 @@ def _sliding(samples: Samples, model: ReconstructedModel) -> Mask:
     """
     motion, sliding = samples.motion, samples.moving.copy()
     ranges = model.history.get("range")
-    least = _TRAVEL * np.asarray(ranges[0]) if ranges else np.full(motion.joints, _TRAVEL)
+    least = TRAVEL * np.asarray(ranges[0]) if ranges else np.full(motion.joints, TRAVEL)
     for run in motion.runs():
         for j in range(motion.joints):
             for first, end in (stretches(samples.moving[run, j]) + run.start).tolist():

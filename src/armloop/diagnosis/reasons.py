@@ -14,10 +14,13 @@ from armloop.diagnosis.evidence import (
     Evidence,
     creep,
     far_outside,
+    seldom,
     shortest_block,
     sliding,
+    sticking,
 )
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE
+from armloop.features.lagrangian import constant_weights
 from armloop.identification.goodness import (
     WORTH_A_WORD,
     Parts,
@@ -27,9 +30,11 @@ from armloop.identification.goodness import (
     witness,
 )
 from armloop.identification.scoring import too_slow
+from armloop.identification.shared_motors import sharing
 from armloop.identification.uncertainty import usual_in_words
 from armloop.laws.effects import Effect
 from armloop.laws.effects.events import ends
+from armloop.laws.effects.torque_offset import TorqueOffset
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Mask
 
@@ -78,13 +83,18 @@ def standing(
     far = strays.mean(axis=0)
     slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
     slides = sliding(samples, model)
+    few = seldom(samples, slides & ~strays & ~creeps)
     reasons = [*_outside(outside, far), *_slow(model, slow)]
     unknown, unexplained, judged = False, [], 0
     multiples: list[bool | None] = []
     for j, part in enumerate(parts):
         unknown |= bool(far[j] > NEARLY_ALL)
         if evidence.rows[:, j].sum() < _FEWEST:
-            reasons.append(_uncounted(j, slides[:, j], strays[:, j], creeps[:, j]))
+            turns = np.abs(samples.motion.v[:, j]) > sticking(model)[j]
+            sharers = sharing(model, j) if turns.sum() >= _FEWEST else []
+            uncounted = _uncounted(j, slides[:, j], strays[:, j], creeps[:, j], sharers)
+            rare = few[j] and slides[:, j].sum() >= _FEWEST
+            reasons.append(_seldom(j, float(strays[:, j].mean())) if rare else uncounted)
             continue
         poor = _too_poor(model, j)
         if poor:
@@ -121,15 +131,21 @@ def _all_over(model: ReconstructedModel, multiples: int, judged: int) -> str:
 
 def too_still(evidence: Evidence) -> str:
     """What keeps a run from being judged, empty if nothing does."""
-    moving = evidence.rows & (np.abs(evidence.samples.motion.v) > creep(evidence.model))
-    still = [j for j, rows in enumerate(moving.T) if rows.sum() < _FEWEST]
+    turning = np.abs(evidence.samples.motion.v) > creep(evidence.model)
+    uncounted = [j for j, rows in enumerate((evidence.rows & turning).T) if rows.sum() < _FEWEST]
     blocks = len(np.unique(evidence.blocks))
-    if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
+    if len(uncounted) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
         return ""
     shortest = shortest_block(evidence.model)
     of = f"{blocks} blocks of {shortest:.2g} s or more"
+    still = [j for j in uncounted if turning[:, j].sum() < _FEWEST]
+    elsewhere = [j for j in uncounted if j not in still]
     of += f"; {_named(still)} hardly slide{'s' * (len(still) == 1)}" if still else ""
-    return f"too little motion to judge ({of}); log at least {(FEWEST_BLOCKS + 1) * shortest:.2g} s in which the joints move"
+    how = ", as fast as in training" if elsewhere else ""
+    if elsewhere:
+        of += f"; {_named(elsewhere)} slide{'s' * (len(elsewhere) == 1)} hardly where, and as fast as, the model was trained"
+    seconds = (FEWEST_BLOCKS + 1) * shortest
+    return f"too little motion to judge ({of}); log at least {seconds:.2g} s in which the joints move{how}"
 
 
 def _named(joints: Sequence[int]) -> str:
@@ -218,6 +234,18 @@ def part_of_a_law(labels: Sequence[str], joint: int, share: float, times: float)
     )
 
 
+def of_a_constant_pull(model: ReconstructedModel, added: Sequence[AddedEffect]) -> list[str]:
+    """A sentence on each offset of a torque reading of a slide that lifts one weight at all postures: it may be a weight."""
+    upright = constant_weights(model.arm)
+    offsets = [a for a in added if isinstance(a.effect, TorqueOffset) and a.effect.index in upright]
+    return [
+        f"joint {a.effect.joint} lifts one weight at all postures: a counterweight that has become lighter or heavier, or a "
+        f"spring that holds it, is a constant force of {a.parameters['offset'].words()} as well, and no motion tells it "
+        "from the sensor; if it is that, a controller must supply as much in addition"
+        for a in offsets
+    ]
+
+
 def event_in_doubt(event: AddedEffect) -> str:
     """A sentence on an event that removes no more than twice what nothing accounts for at other times."""
     start, end = ends(event.parameters)
@@ -245,9 +273,27 @@ def event_untold(event: AddedEffect) -> str:
     )
 
 
-def _uncounted(j: int, slides: Mask, strays: Mask, creeps: Mask) -> str:
-    """Why next to nothing counts of a joint, by its samples (N,)."""
+def _seldom(j: int, far: float) -> str:
+    """A sentence on a joint that slides too seldom where the model was trained; a part of its samples is far from there."""
+    beyond = f", or is where it was not trained ({far:.0%})" if far > WORTH_A_WORD else ""
+    return (
+        f"joint {j + 1} turns round as soon as its torque can be told from that of the turn{beyond}, and slides in but few "
+        "samples: nothing can be said of it"
+    )
+
+
+def _uncounted(j: int, slides: Mask, strays: Mask, creeps: Mask, sharers: Sequence[int] = ()) -> str:
+    """Why next to nothing counts of a joint, by its samples (N,).
+
+    Args:
+        sharers: joints (0-based) that share a motor with it, where it turns all the same.
+    """
     if slides.sum() < _FEWEST:
+        if sharers:
+            return (
+                f"joint {j + 1} turns, but the motor that it shares with joint {' and '.join(str(k + 1) for k in sharers)} "
+                "stands still in this run, and holds what its friction may: nothing can be said of it"
+            )
         return f"joint {j + 1} does not slide in this run: nothing can be said of it"
     if (slides & ~strays).sum() < _FEWEST:
         where = f"beyond {FAR:g} times the range the model was trained on"

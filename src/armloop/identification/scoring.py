@@ -16,6 +16,7 @@ from armloop.data.creep import held_speed
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
+from armloop.identification.shared_motors import without_shared_standstill
 from armloop.laws.effects import Context, Effect
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Mask
@@ -66,6 +67,7 @@ def filtered_context(model: ReconstructedModel, samples: Samples, effects: Seque
 def score(model: ReconstructedModel, samples: Samples, rows: Mask | None = None) -> Score:
     """Score a model on the samples, or on those in ``rows`` (N,)."""
     chosen = np.ones(samples.motion.samples, dtype=bool) if rows is None else rows
+    samples = without_shared_standstill(samples, model)
     return score_errors(residual(model, samples)[chosen], samples.tau[chosen], samples.moving[chosen])
 
 

@@ -24,6 +24,7 @@ from armloop.laws.effects.base import Place, fill
 from armloop.laws.friction import FrictionLaw
 from armloop.model.added_effect import AddedEffect, ripples
 from armloop.model.components import COMPONENTS, Component, RigidBody
+from armloop.model.formulas import formulas, legend
 from armloop.model.pointwise import InverseDynamics, Parts, pointwise, stacked
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
@@ -37,11 +38,6 @@ from armloop.util.reading import read_json
 SCHEMA = "armloop/model/2"
 #: Samples whose rigid-body torque is computed at a time: it takes many arrays of them, which are to stay in the cache.
 _ROWS = 4096
-
-_STOP = (
-    "stop(q,w) is friction with memory, from -1 to 1: the stretch since the last reversal, in parts of the w, rad or m,\n"
-    "  at which the joint slides"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,25 +291,12 @@ class ReconstructedModel:
         return replace(self, effects=(*self.effects, *added))
 
     def formulas(self) -> list[str]:
-        """One readable formula per joint, with the step that found each term in brackets."""
-        lines = []
-        for j in range(self.arm.n):
-            terms: list[tuple[int, float, str]] = []
-            for component in self.components:
-                terms += component.terms(self.arm, j)
-            terms += [(t.step, t.coefficient, t.name(j + 1)) for t in self.friction.terms[j]]
-            terms.sort(key=lambda term: term[0])
-            body = " ".join(
-                f"{'-' if c < 0 else '+'} {abs(c):.4g}{'' if name == '1' else '*' + name}"
-                for _, c, name in terms
-            )
-            lines.append(f"tau{j + 1} = {body.removeprefix('+ ') or '0'}")
-        return lines
+        """One readable formula per joint, of all that the arm has: what was found beside the libraries' terms, too."""
+        return formulas(self)
 
     def legend(self) -> list[str]:
         """What symbols in the formulas stand for, an entry each; empty where they speak for themselves."""
-        remembers = any(self.friction.remembers(j) for j in range(len(self.friction.terms)))
-        return [line for component in self.components for line in component.legend()] + [_STOP] * remembers
+        return legend(self)
 
     def save(self, path: str | Path) -> None:
         """Write the model file (JSON), whole or not at all."""

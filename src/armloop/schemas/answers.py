@@ -124,6 +124,10 @@ class TrackingData(Struct):
     scored_s: list[Seconds] = []
     unit: list[Name] = []
     stable: Annotated[bool, Meta(description="the loop at rest where the reference begins")] = True
+    unstable_at_s: Annotated[
+        list[float],
+        Meta(description="times of the reference, of ten, at whose postures the loop at rest is not stable"),
+    ] = []
     not_run: Annotated[list[Name], Meta(description="controllers without a model")] = []
     written_by: Name = ""
 

@@ -24,7 +24,8 @@ from armloop.drake.experiments.tracking import (
     without_model,
 )
 from armloop.drake.plant.fault_injection import realise
-from armloop.drake.tuning.loop_analysis import SampledArm, posture_model, sampled_margins
+from armloop.drake.tuning.loop_analysis import sampled_margins
+from armloop.drake.tuning.tuned_loop import along_reference
 from armloop.drake.view.live import LiveView
 from armloop.identification.goodness import extrapolated
 from armloop.identification.reconstruction import reconstruct
@@ -63,10 +64,15 @@ def run_scenario(
     progress(f"tracking {scenario.reference.duration:g} s with each controller")
     results = run_tracking(scenario, chosen) if view is None else track_in_view(scenario, chosen, view)
     answer = tracking_answer(scenario, results) | {"not_run": without_model(scenario, chosen)}
-    if not answer["stable"]:
+    if answer["unstable_at_s"]:
+        times = ", ".join(f"{t:.3g}" for t in answer["unstable_at_s"])
+        where = (
+            "where the reference begins"
+            if not answer["stable"]
+            else f"where the reference is after {times} s"
+        )
         warn(
-            f"{scenario.name}: where the reference begins the loop is not stable with the scenario's gains; armloop tune "
-            "proposes others"
+            f"{scenario.name}: {where} the loop is not stable with the scenario's gains; armloop tune proposes others"
         )
     if folder is not None:
         from armloop.drake.view.replay import write_replay
@@ -132,14 +138,14 @@ def save_made(
 
 def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
     """The content of ``tracking.json``: η and other metrics per joint and controller, and the loop's margins at rest."""
-    plant, q0 = scenario.plant, scenario.reference.evaluate([0.0])[0][0]
-    linear = posture_model(plant.arm, plant.config.friction, q0, scenario.effects)
-    sampled = SampledArm.of(linear, plant.config.time_step)
+    along = along_reference(scenario)
+    sampled = along[0.0]
     return {
         **heading(scenario, next(iter(results.values())).unit),
         "settling_band": BAND,
         "controllers": {name: result_answer(result) for name, result in results.items()},
         "stable": sampled.is_stable(scenario.gains),
+        "unstable_at_s": [t for t, one in along.items() if not one.is_stable(scenario.gains)],
         "loop": [
             finite(
                 {

@@ -89,6 +89,13 @@ def test_it_is_stated_with_the_errors_of_where_it_runs() -> None:
         sure
     )
 
+    for error, told in ((19.9, True), (20.0, False), (float("nan"), False)):
+        vague = {**found, "stiffness": Estimate(40.0, error, "N/m")}
+        assert kind.sentence(vague).startswith(
+            "an elastic cable" if told else "something elastic pulls at link 2 ± 0.1,"
+        )
+        assert ("this run does not tell: 40 N/m from (0.4" in kind.sentence(vague)) != told
+
 
 @pytest.mark.parametrize(
     ("of", "possible"),

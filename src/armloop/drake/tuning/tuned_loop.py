@@ -80,6 +80,18 @@ class Tuning:
         return [(unit, j, has, wanted) for unit, j, has, wanted in found if has < (1 - CLOSE) * wanted]
 
 
+def along_reference(scenario: TrackingScenario) -> dict[float, SampledArm]:
+    """The sampled arm linearised at postures of a scenario's reference, from its beginning on, by their times, s."""
+    plant = scenario.plant
+    times = np.linspace(0, scenario.reference.duration, _POSTURES + 1)[:-1]
+    return {
+        float(t): SampledArm.of(
+            posture_model(plant.arm, plant.config.friction, q, scenario.effects), plant.config.time_step
+        )
+        for t, q in zip(times, scenario.reference.evaluate(times)[0], strict=True)
+    }
+
+
 def look_at(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:
     """Return what a scenario's arm does with these gains, in the posture where its reference begins and along it."""
     q0 = scenario.reference.evaluate([0.0])[0][0]
@@ -90,8 +102,7 @@ def look_at(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:
     margins = sampled_margins(sampled, gains)
     w = np.geomspace(0.1, np.pi / period, 600)
     L = sampled.loops(gains, w)
-    postures = scenario.reference.evaluate(np.linspace(0, scenario.reference.duration, _POSTURES + 1)[:-1])[0]
-    others = [SampledArm.of(posture_model(plant.arm, plant.config.friction, q), period) for q in postures]
+    others = list(along_reference(replace(scenario, effects=())).values())
     along = [sampled_margins(other, gains, points=500) for other in others]
     # long enough for the slowest joint's loop to settle but for the integrator's tail
     slowest = min(m.bandwidth for m in margins)

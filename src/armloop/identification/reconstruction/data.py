@@ -29,6 +29,8 @@ from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Serial, Workers
 
 Answer = TypeVar("Answer")
+#: Samples as something sees them.
+View = Callable[[Samples], Samples]
 
 #: Samples of the reference: enough for clusters and quantiles.
 REFERENCE = 50_000
@@ -83,6 +85,10 @@ class Chunk:
         """The chunk itself: in memory it need not be made."""
         return self
 
+    def through(self, view: View) -> Chunk:
+        """The same with its samples as something else sees them."""
+        return replace(self, samples=view(self.samples))
+
     def nested(self) -> Chunk:
         """The same with one more fold held out, which alone chooses the library."""
         choosing = self.blocks % self.folds == _CHOOSING
@@ -126,6 +132,7 @@ class _Conditioned:
     speeds: Speeds | None
     options: Options
     first: int = 0
+    view: View | None = None
 
     def chunk(self) -> Chunk | None:
         """None where no run is long enough for the filter."""
@@ -133,7 +140,11 @@ class _Conditioned:
             samples = preprocess([self.source.read()], self.how, self.speeds)
         except ShortRunError:
             return None
-        return Chunk.of(samples, self.options, self.first)
+        return Chunk.of(samples if self.view is None else self.view(samples), self.options, self.first)
+
+    def through(self, view: View) -> _Conditioned:
+        """The same with its samples as something else sees them."""
+        return replace(self, view=view)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +189,13 @@ class Data:
         if not chunks:
             preprocess(logs, how, speeds)  # says how long a run must be
         return Data(chunks, _joined(chunks), Serial(), names=names)
+
+    def through(self, view: View) -> Data:
+        """The same samples as something else sees them: which of them count as moving."""
+        parts = [part.through(view) for part in self.parts]
+        # a selection of samples is none of neighbours, which a view may ask for
+        reference = self.reference.through(view) if self.in_memory else self.reference
+        return replace(self, parts=parts, reference=reference)
 
     def nested(self) -> Data:
         """The same, in memory, with one more fold held out, which alone chooses the library."""

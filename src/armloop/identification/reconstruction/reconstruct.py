@@ -17,7 +17,7 @@ from armloop.identification.goodness import Parts, merged, parts_of, witness
 from armloop.identification.goodness.features import Scales
 from armloop.identification.goodness.witness import MOST, Witness
 from armloop.identification.reconstruction.bandwidth import check_nyquist
-from armloop.identification.reconstruction.data import Chunk, Data
+from armloop.identification.reconstruction.data import Chunk, Data, View
 from armloop.identification.reconstruction.excitation import check_recorded, determined
 from armloop.identification.reconstruction.fitted import left_out_null, uncertainty
 from armloop.identification.reconstruction.friction_selection import check_laws
@@ -43,6 +43,7 @@ from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.reconstruction.torque_lag import Beside
 from armloop.identification.scoring import Score, residual
+from armloop.identification.shared_motors import without_shared_standstill
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
 from armloop.model.added_effect import ripples
@@ -196,7 +197,7 @@ def reconstruct(
             ready = preparing(arm=arm, corrected=method != REFERENCE)
         arm = as_it_stands(arm, stances)
 
-    def attempt(library: Library, nested: bool = False) -> Attempt:
+    def attempt(library: Library, nested: bool = False, view: View | None = None) -> Attempt:
         how = ready.conditioning(library.conditioning)
         progress(f"{library.name}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
         if streamed:
@@ -204,6 +205,7 @@ def reconstruct(
         else:
             data = Data.kept(ready.kept, how, ready.options)
             data = data.nested() if nested else data
+        data = data if view is None else data.through(view)
         check_recorded(arm, np.abs(data.reference.samples.tau).max(axis=0))
         found = library.methods[method](arm, data, ready.options, progress)
         found.history |= ready.history()
@@ -216,11 +218,18 @@ def reconstruct(
     tried, part = _compared(wanted, refused, attempt, ready)
     if method != REFERENCE:
         _find_ripple(_chosen(tried), ready.logs)
-        again = _in_step(ready, _chosen(tried), partial(preparing, arm=arm))
+        again, seen = _in_step(ready, _chosen(tried), partial(preparing, arm=arm)), _chosen(tried).model()
+        shared = any(added.effect.other_joint and added.effect.passive for added in seen.effects)
         if again is not None:
             ready = again
             progress("what was found has a part in when the torque seems to be recorded: anew beside it")
-            tried, part = _compared(wanted, refused, attempt, ready)
+        if shared:
+            progress(
+                "what motors hold that two joints share, while they stand still, tells nothing: anew without it"
+            )
+        if again is not None or shared:
+            view = partial(without_shared_standstill, model=seen) if shared else None
+            tried, part = _compared(wanted, refused, partial(attempt, view=view), ready)
             _find_ripple(_chosen(tried), ready.logs)
     return _finished(tried, part, method, ready, progress, recorded)
 

@@ -25,6 +25,7 @@ from armloop.identification.reconstruction.readings import meant
 from armloop.identification.reconstruction.stances import Stance, as_it_stands
 from armloop.identification.reconstruction.stances_together import together
 from armloop.identification.reconstruction.systematic_sample import placed_runs
+from armloop.identification.reconstruction.unlike_logs import unlike
 from armloop.identification.reconstruction.weightless import (
     WEIGHT_ALONE,
     lighter,
@@ -95,6 +96,11 @@ def check_torques(
             f"{names}: {lighter(times)}: energies of the library lagrangian can be of that alone, a rigid body has weight "
             "(add tau_g(q) to tau for one)"
         )
+    by_name: dict[str, list[MotionLog]] = {}
+    for run in chosen:
+        by_name.setdefault(run.name, []).append(run)
+    if others := unlike(problem, by_name, arm, cutoff_hz):
+        warn(f"{names}: {others}")
     return found if blind is not None else []
 
 

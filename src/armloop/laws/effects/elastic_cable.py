@@ -27,6 +27,8 @@ from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import Vector, point_torques
 from armloop.util.functions import NUMPY, Functions
 
+#: Part of its stiffness by which a cable that a run determines is off, at most: two standard errors.
+_SURE = 0.5
 #: m²: so near to its anchor a cable has no direction.
 _NOTHING = 1e-18
 
@@ -144,6 +146,12 @@ class ElasticCable(Effect):
             return (
                 f"a spring holds {where} at {slack.words(3)} from ({at}) m in the base frame with {k.words()}: it pulls and "
                 "pushes"
+            )
+        if not number(k.std_error) < _SURE * number(k.value):
+            return (
+                f"something elastic pulls at link {which}, as a cable, a hose or a spring from the base would; how stiff it "
+                f"is and where it runs this run does not tell: {number(k.value):.3g} N/m from ({at}) m in the base frame to "
+                f"({to}) m in the link's, slack up to {slack.words(3)}, is one of many that would do"
             )
         return (
             f"an elastic cable, a hose or a spring, pulls {where} towards ({at}) m in the base frame with {k.words()}, once "
