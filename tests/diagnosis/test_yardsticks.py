@@ -173,6 +173,7 @@ def test_a_model_without_a_baseline_is_weighed_by_the_torque() -> None:
             uncertainty={},
             context=lambda motion, effects: context,
             arm=None,
+            effects=(),
         )
         return Evidence.of(model, given, [])
 

@@ -47,7 +47,7 @@ def test_a_loop_that_is_not_stable_where_its_reference_leads_is_told_of(tmp_path
     assert answer["stable"] is True and answer["unstable_at_s"] == []
 
     def unstable(gains: PidGains) -> list[float]:
-        along = along_reference(usual)
+        along = along_reference(usual, usual.effects)
         return [t for t, one in along.items() if not one.is_stable(gains)]
 
     for kd in np.geomspace(

@@ -32,13 +32,16 @@ def without_shared_standstill(
     Args:
         least: (n,) dry friction, N·m (N), of such a motor on each joint that is worth it; any by default.
     """
-    shared, moving = _shared(model), samples.moving
+    shared = _shared(model)
+    if not shared:
+        return samples
+    moving = samples.moving
     for along, level in shared:
         on_joints = [0.0] * model.arm.n
         along.add(on_joints, level)
         held = np.abs(on_joints) > (0.0 if least is None else least)
         moving = moving & ~(_stands_still(along, model, samples)[:, None] & held)
-    return replace(samples, moving=moving) if shared else samples
+    return replace(samples, moving=moving)
 
 
 def sharing(model: ReconstructedModel, joint: int) -> list[int]:

@@ -125,7 +125,7 @@ class TrackingData(Struct):
     unit: list[Name] = []
     stable: Annotated[bool, Meta(description="the loop at rest where the reference begins")] = True
     unstable_at_s: Annotated[
-        list[float],
+        list[Seconds],
         Meta(description="times of the reference, of ten, at whose postures the loop at rest is not stable"),
     ] = []
     not_run: Annotated[list[Name], Meta(description="controllers without a model")] = []

@@ -138,7 +138,7 @@ def save_made(
 
 def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
     """The content of ``tracking.json``: η and other metrics per joint and controller, and the loop's margins at rest."""
-    along = along_reference(scenario)
+    along = along_reference(scenario, scenario.effects)
     sampled = along[0.0]
     return {
         **heading(scenario, next(iter(results.values())).unit),

@@ -41,7 +41,7 @@ def looked_at(
         asked["steps"].append((q0, dry, duration))
         return np.arange(3.0), np.tile(unit * (0.5 if dry else 0.9), (3, 1))
 
-    monkeypatch.setattr(tuned_loop, "posture_model", lambda arm, friction, q: float(q[0]))
+    monkeypatch.setattr(tuned_loop, "posture_model", lambda arm, friction, q, effects=(): float(q[0]))
     monkeypatch.setattr(tuned_loop, "SampledArm", SimpleNamespace(of=sample))
     monkeypatch.setattr(tuned_loop, "sampled_margins", margins)
     monkeypatch.setattr(tuned_loop, "cut_loop", lambda L, i: (i + 1) * L[1])

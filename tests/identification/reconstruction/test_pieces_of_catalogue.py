@@ -81,7 +81,7 @@ def test_laws_that_an_arm_may_have_had_all_along() -> None:
     assert names == {
         *("encoder_offset", "gravity_tilt", "joint_spring", "rotor_inertia", "time_delay"),
         *("torque_delay", "torque_gain", "torque_offset", "torque_ripple", "transmission_coupling"),
-        *("upper_end_stop", "lower_end_stop", "coupling_spring"),
+        *("upper_end_stop", "lower_end_stop", "coupling_spring", "spring_balancer"),
     }
 
 

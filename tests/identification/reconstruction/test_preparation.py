@@ -109,7 +109,9 @@ def test_a_library_that_is_named_is_not_asked_whether_the_logs_suit_it(
         monkeypatch.setattr(module, check, lambda *_: None)
     monkeypatch.setattr(module, "_refused", lambda arm, wanted, ready: {wanted[0]: "why"})
     monkeypatch.setattr(module, "_compared", lambda wanted, refused, attempt, ready: (refused, "all"))
-    monkeypatch.setattr(module, "_chosen", lambda tried: None)
+    monkeypatch.setattr(
+        module, "_chosen", lambda tried: SimpleNamespace(model=lambda: SimpleNamespace(effects=()))
+    )
     monkeypatch.setattr(module, "_find_ripple", lambda *_: None)
     monkeypatch.setattr(module, "_in_step", lambda *_: None)
     monkeypatch.setattr(module, "_finished", lambda refused, *_: refused)

@@ -9,6 +9,7 @@ import numpy as np
 from armloop.drake.control.pid import PidGains
 from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.experiments.tracking import TrackingResult, run_tracking
+from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.tuning.gain_design import CLOSE
 from armloop.drake.tuning.loop_analysis import (
     LoopMargins,
@@ -80,13 +81,13 @@ class Tuning:
         return [(unit, j, has, wanted) for unit, j, has, wanted in found if has < (1 - CLOSE) * wanted]
 
 
-def along_reference(scenario: TrackingScenario) -> dict[float, SampledArm]:
-    """The sampled arm linearised at postures of a scenario's reference, from its beginning on, by their times, s."""
+def along_reference(scenario: TrackingScenario, effects: Effects) -> dict[float, SampledArm]:
+    """The sampled arm, with effects, linearised at postures of a scenario's reference, from its beginning on, by time, s."""
     plant = scenario.plant
     times = np.linspace(0, scenario.reference.duration, _POSTURES + 1)[:-1]
     return {
         float(t): SampledArm.of(
-            posture_model(plant.arm, plant.config.friction, q, scenario.effects), plant.config.time_step
+            posture_model(plant.arm, plant.config.friction, q, effects), plant.config.time_step
         )
         for t, q in zip(times, scenario.reference.evaluate(times)[0], strict=True)
     }
@@ -102,7 +103,7 @@ def look_at(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:
     margins = sampled_margins(sampled, gains)
     w = np.geomspace(0.1, np.pi / period, 600)
     L = sampled.loops(gains, w)
-    others = list(along_reference(replace(scenario, effects=())).values())
+    others = list(along_reference(scenario, ()).values())
     along = [sampled_margins(other, gains, points=500) for other in others]
     # long enough for the slowest joint's loop to settle but for the integrator's tail
     slowest = min(m.bandwidth for m in margins)

@@ -186,7 +186,7 @@ def permanent(arm: Arm) -> list[Effect]:
 
     A joint's friction is none of them: it has the friction selection, which has had its say.
     """
-    return [e for e in hypotheses(arm) if not (e.rubs or e.memory or e.name in _OF_A_RUN)]
+    return [e for e in hypotheses(arm, built_in=True) if not (e.rubs or e.memory or e.name in _OF_A_RUN)]
 
 
 #: An effect, its shapes with which of the coefficients of each it has, its trial, and how many shapes were asked.

@@ -115,15 +115,18 @@ def misstated(kind: type[Effect], parameters: Mapping[str, Any], *, whole: bool 
     return kind.fault(parameters)
 
 
-def hypotheses(arm: Arm) -> list[Effect]:
+def hypotheses(arm: Arm, built_in: bool = False) -> list[Effect]:
     """Every effect that is searched for, at every joint of an arm and at every pair of joints.
+
+    Args:
+        built_in: also those that arms are built with, and that are sought in training data alone.
 
     Raises:
         InputError: an effect of the user's own cannot be loaded.
     """
     listed: list[Effect] = []
     for kind in [*EFFECTS.values(), *REGISTRY.own().values()]:
-        if not kind.searched:
+        if not (kind.searched or (built_in and kind.built_in)):
             continue
         if kind.pair_wise:
             listed += [kind(j + 1, k + 1) for j in range(arm.n) for k in range(j + 1, arm.n)]

@@ -162,6 +162,7 @@ class Effect(ABC):
             run, which no controller supplies. ``sensor`` and ``event`` follow from it, and that no event is ``searched``:
             a hypothesis of a diagnosis.
         parameters: what it calls its numbers; as many are free (``complexity``) unless it says otherwise.
+        built_in: whether an arm may be built with it, so that it is sought in training data, if it is not ``searched``.
         needs_inertial: whether its columns are made of the known model's inertial parameters.
         needs_model: whether its columns depend on anything the known model says, not on the motion alone.
         mesh: columns of a nonlinear parameter between multiples of this may be interpolated; None where they may not.
@@ -196,6 +197,7 @@ class Effect(ABC):
     event: bool = False
     onset: Onset | Spells | None = None
     searched: ClassVar[bool] = True
+    built_in: ClassVar[bool] = False
     memory: ClassVar[bool] = False
     of_time: ClassVar[bool] = False
     watched: ClassVar[bool] = True
