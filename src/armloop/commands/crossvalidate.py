@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from armloop.commands.arguments import (
     ARM_HELP,
@@ -18,6 +19,9 @@ from armloop.commands.arguments import (
 from armloop.commands.options import flag, option, positive, required
 from armloop.util.errors import InputError
 from armloop.util.outputs import take_folder
+
+if TYPE_CHECKING:
+    from armloop.identification.validation.crossvalidate import Fit
 
 HELP = "reconstruct with each log, or alternating blocks, left out in turn, and score what was left out"
 EXAMPLE = "armloop crossvalidate run1.csv run2.csv run3.csv --arm arm.urdf"
@@ -120,6 +124,18 @@ def run(options: Crossvalidate) -> None:
         print(ladder, end="\n\n")
     if comparison is not None:
         print(physical_table(comparison), end="\n\n")
-    for note in dict.fromkeys(note for _, fit in result.results for note in fit.notes):
-        if not note.startswith("friction, "):  # the table has them all
-            print(wrapped(f"note: {note}"))
+    for line in notes_of(result.results):
+        print(wrapped(line))
+
+
+def notes_of(results: Sequence[tuple[str, Fit]]) -> list[str]:
+    """What the reconstructions noted, each once, and of which of them it is said unless of all; a table has friction's."""
+    without: dict[str, list[str]] = {}
+    for name, fit in results:
+        for note in dict.fromkeys(fit.notes):
+            without.setdefault(note, []).append(name)
+    return [
+        f"note: {note}" if len(names) == len(results) else f"note (model without {', '.join(names)}): {note}"
+        for note, names in without.items()
+        if not note.startswith("friction, ")
+    ]

@@ -4,12 +4,15 @@ import importlib
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, three_axis
 
 from armloop.cli import main
+from armloop.commands.crossvalidate import notes_of
 from armloop.data.log import MotionLog, write_log
 from armloop.data.signals import Conditioning
 from armloop.identification.reconstruction import Options
@@ -56,6 +59,20 @@ def test_logs_of_one_name_keep_their_notes_apart(
     answer = json.loads(capsys.readouterr().out)
     names = ["run", "run (2)", "run (3)"]
     assert list(answer["notes"]) == names and [one["file"] for one in answer["files"]] == names
+
+
+def test_what_one_model_noted_is_said_of_that_one() -> None:
+    fits: Any = [
+        ("run1", SimpleNamespace(notes=["all", "friction, viscous", "it leaves 2 %", "all"])),
+        ("run2", SimpleNamespace(notes=["all", "it leaves 1 %", "both"])),
+        ("run3", SimpleNamespace(notes=["both", "all"])),
+    ]
+    assert notes_of(fits) == [
+        "note: all",
+        "note (model without run1): it leaves 2 %",
+        "note (model without run2): it leaves 1 %",
+        "note (model without run2, run3): both",
+    ]
 
 
 def test_the_command_answers_for_blocks(
