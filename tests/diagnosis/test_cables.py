@@ -280,14 +280,15 @@ def test_what_may_run_to_another_link_is_as_uncertain_as_they_are_apart(model: R
     ("likelier", "named", "costly", "taken"),
     [
         ((True, True), True, False, True),
-        ((False, True), True, False, False),
+        ((False, True, True), True, False, True),  # in place of what was found, though not beside it
+        ((False, False), True, False, False),
         ((True, False), True, False, False),
         ((True, True), False, False, False),
         ((True, True), True, True, False),
     ],
 )
 def test_it_is_taken_if_the_run_is_likelier_with_it_and_no_joint_pays(
-    likelier: tuple[bool, bool], named: bool, costly: bool, taken: bool, monkeypatch: pytest.MonkeyPatch
+    likelier: tuple[bool, ...], named: bool, costly: bool, taken: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rows = np.ones((2, 2), dtype=bool)
     whole: Any = SimpleNamespace(rows=rows, only=lambda rows: None)
@@ -303,6 +304,7 @@ def test_it_is_taken_if_the_run_is_likelier_with_it_and_no_joint_pays(
         "with_account": SimpleNamespace(fit=made),
         "_beside": [[], [], []],
         "_alone": "alone",
+        "_of_nothing": account,
         "account_beside": SimpleNamespace(outcome=SimpleNamespace(after=SimpleNamespace(effects=[]))),
         "merged": more,
         "at_the_cost_of_others": costly,

@@ -68,8 +68,13 @@ def account_with_cable(
         return None
     rows = plain.rows & account.whole.rows
     least = posterior(account, account.remaining(), rows)
-    known = with_account(plain, [cable], account)
-    if not _is_likelier(_alone(account, plain, cable, known), rows, least):
+    # what was found may be there beside it, or be what stood in its place
+    tried = [(each, with_account(plain, [cable], each)) for each in (account, _of_nothing(account))]
+    likelier = (
+        known for each, known in tried if _is_likelier(_alone(each, plain, cable, known), rows, least)
+    )
+    known = next(likelier, None)
+    if known is None:
         return None
     nowhere = np.zeros_like(whole.rows)
     other = account_beside(whole, known, nowhere, progress, jobs)
@@ -99,6 +104,11 @@ def _is_asked(account: Account) -> bool:
     laws = sum(found.effect.load for found in account.outcome.found)
     much = much_is_left(account.outcome.after.score).any()
     return account.unlisted is not None or bool(much) or len(account.contacts) + laws > 1
+
+
+def _of_nothing(account: Account) -> Account:
+    """The account without the effects found."""
+    return replace(account, outcome=Outcome([], account.outcome.before, account.outcome.before))
 
 
 def _alone(account: Account, evidence: Evidence, cable: Found, known: Known) -> Account:
