@@ -245,3 +245,13 @@ def test_a_joint_of_which_few_samples_count_is_not_judged(samples: int, counts: 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evidence, "independent_rows", lambda samples: np.arange(samples.N) % 2 == 0)
         assert evidence.seldom(every, rows).tolist() == [not told, False]
+
+
+def test_no_row_of_such_a_joint_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = model_with_baseline()
+    samples = preprocess(
+        [measured(motion_of(3, 5.0), torque(motion_of(3, 5.0)), 3, 0.01)], model.conditioning
+    )
+    assert Evidence.of(model, samples, []).rows.any(axis=0).tolist() == [True, True, True]
+    monkeypatch.setattr(evidence, "seldom", lambda samples, rows: np.array([False, True, False]))
+    assert Evidence.of(model, samples, []).rows.any(axis=0).tolist() == [True, False, True]

@@ -80,6 +80,12 @@ class TestStandstillOfAMotor:
         assert noisy.conditioning.dead_zone * 0.006 * np.sqrt(2) > 0.03
         assert not without_shared_standstill(samples, noisy).moving[:, 1:].any()
 
+    def test_it_creeps_no_faster_than_joints_that_stick(self) -> None:
+        for apart, turns in ((0.019, False), (0.021, True)):
+            samples = sampled(np.column_stack([np.ones(600), self.V2, self.V2 - apart]))
+            seen = without_shared_standstill(samples, model_with(geared(-1.0)))
+            assert seen.moving[:, 1:].all() == turns == seen.moving[:, 1:].any()
+
     def test_it_turns_round_between_two_samples(self) -> None:
         v = np.array([[1.0, 0.5, 0.1], [1.0, 0.1, 0.5], [1.0, 0.05, 0.6]])
         seen = without_shared_standstill(
