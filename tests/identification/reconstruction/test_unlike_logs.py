@@ -23,16 +23,18 @@ Array = NDArray[np.float64]
 LOAD = {"tool": 1.0, "trinket": 0.03}
 
 
-def log(name: str, seed: int, mass: float = 0.0, off: int | None = None) -> MotionLog:
+def log(
+    name: str, seed: int, mass: float = 0.0, off: int | None = None, noise: float = 0.01, rubs: float = 1.0
+) -> MotionLog:
     """A run of an arm that carries a mass at its tool, or one of whose drives is off and another hand moves it."""
     arm, motion = three_axis(), fourier_motion(30, 100, seed)
-    tau = rigid_torque(arm, motion.q, motion.v, motion.vdot) + friction(motion.v)
+    tau = rigid_torque(arm, motion.q, motion.v, motion.vdot) + rubs * friction(motion.v)
     carried = np.zeros_like(nominal_parameters(arm))
     carried[-10], carried[-10 + 1] = mass, 0.3 * mass
     tau = tau + regressor(arm, motion.q, motion.v, motion.vdot) @ carried
     if off is not None:
         tau[:, off] = 0.0
-    return recorded(motion, tau, seed, name=name)
+    return recorded(motion, tau, seed, noise, name)
 
 
 def found(*logs: MotionLog) -> str:
@@ -53,6 +55,43 @@ def test_a_log_with_a_tool_beside_others_without_is_named(seed: int) -> None:
     assert found(*bare) == ""
     assert found(*bare, log("with trinket", 10 * seed + 2, LOAD["trinket"])) == ""
     assert found(bare[0]) == ""
+
+
+def test_what_is_exact_but_for_round_off_is_not_unlike() -> None:
+    logs = [log(f"exact {k}", k, noise=0.0, rubs=0.0) for k in range(2)]
+    whole, own = PlainFits.of(logs, three_axis(), 8.5), PlainFits.of(logs[:1], three_axis(), 8.5)
+    assert whole is not None and own is not None
+    theta, _ = whole.solved(whole.table.tau, whole.table.moving)
+    usual = own.table.sizes(own.table.tau, own.table.moving)
+    # ten thousandths of the torque that a sensor's last digit would hide
+    _, alone, together = unlike_logs._left(own, theta * (1 + 1e-4), usual)
+    assert (together < 3 * alone).all() and found(*logs) == ""
+
+
+def test_each_half_is_judged_by_a_model_of_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = PlainFits.of([log("run", 0)], three_axis(), 8.5)
+    assert own is not None
+    fitted: list[NDArray[np.bool_]] = []
+    judged: list[NDArray[np.bool_]] = []
+    solved, sizes = PlainFits.solved, type(own.table).sizes
+
+    def recorded_solved(self: PlainFits, tau: Array, rows: NDArray[np.bool_]) -> tuple[Array, Array]:
+        answer = solved(self, tau, rows)
+        fitted.append(rows)
+        judged.clear()
+        return answer
+
+    def recorded_sizes(self: object, values: Array, rows: NDArray[np.bool_]) -> Array:
+        judged.append(rows)
+        if len(fitted) and len(judged) == 1 and len(pairs) < len(fitted):
+            pairs.append((fitted[-1], rows))
+        return np.asarray(sizes(self, values, rows))
+
+    pairs: list[tuple[NDArray[np.bool_], NDArray[np.bool_]]] = []
+    monkeypatch.setattr(PlainFits, "solved", recorded_solved)
+    monkeypatch.setattr(type(own.table), "sizes", recorded_sizes)
+    unlike_logs._left(own, np.zeros(own.table.columns.shape[2]), np.zeros(3))
+    assert len(pairs) == 2 and not any((rows & others).any() for rows, others in pairs)
 
 
 def test_a_drive_that_is_off_in_a_log_says_nothing_there() -> None:
