@@ -29,14 +29,15 @@ def test_another_fall_is_none_of_midnight(fall: float) -> None:
     assert through_midnight(rising, DAY) is rising or (through_midnight(rising, DAY) == rising).all()
 
 
-def test_a_log_of_seconds_of_the_day_is_converted(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("unit", "per_second"), [("s", 1), ("ms", 1000)])
+def test_a_log_of_seconds_of_the_day_is_converted(unit: str, per_second: int, tmp_path: Path) -> None:
     time = 86398.0 + 0.004 * np.arange(1500)
     angle = np.sin(time - time[0])
-    rows = [f"{t % DAY:.3f},{q:.6f},{2 * q:.6f}" for t, q in zip(time, angle, strict=True)]
+    rows = [f"{per_second * (t % DAY):.3f},{q:.6f},{2 * q:.6f}" for t, q in zip(time, angle, strict=True)]
     source, mapping, out = (tmp_path / name for name in ("night.csv", "map.yaml", "log.parquet"))
     source.write_text("\n".join(["clock,angle,torque", *rows]))
     mapping.write_text(
-        "schema: armloop/map/1\ntime: {column: clock, unit: s}\nq: {columns: [angle], unit: rad}\n"
+        f"schema: armloop/map/1\ntime: {{column: clock, unit: {unit}}}\nq: {{columns: [angle], unit: rad}}\n"
         "tau: {columns: [torque], unit: N*m}\n"
     )
     assert main(["convert", str(source), "--map", str(mapping), "--out", str(out)]) == 0

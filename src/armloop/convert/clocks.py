@@ -90,7 +90,7 @@ def through_midnight(numbers: Array, day: float) -> Array:
     step = np.diff(numbers, prepend=numbers[:1])
     longest = GAP_PERIODS * float(np.median(step[step > 0])) if (step > 0).any() else 0.0
     falls = step < 0
-    if longest >= 0.5 * day or not (np.abs(step[falls] + day - 0.5 * longest) <= 0.5 * longest).all():
+    if not (np.abs(step[falls] + day - 0.5 * longest) <= 0.5 * longest).all():
         return numbers
     return np.asarray(numbers + day * np.cumsum(falls))
 
