@@ -1,12 +1,14 @@
 """Scores are RMSE and nRMSE per joint, with standstill apart from motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic import three_axis
 
 from armloop.data.filters import LowPass
 from armloop.data.motion import Motion, Samples
-from armloop.identification.scoring import residual, score, score_errors
+from armloop.identification.scoring import of_slow_motion, residual, score, score_errors
 from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
 from armloop.model.components import SparseTerms
@@ -78,3 +80,30 @@ def test_the_prediction_passes_the_filter_of_the_measurement():
     smeared = LowPass(5.0, 0.02)(q)
     samples = Samples(motion, smeared, np.ones_like(q, dtype=bool), 0.02, 5.0)
     np.testing.assert_allclose(residual(model, samples), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("slow_error", "told"), [(0.9, True), (0.3, False)])
+def test_what_is_left_of_motion_slower_than_in_training_is_told_apart(slow_error: float, told: bool) -> None:
+    """Joint 1 creeps in half of its samples; joint 2 in all, of which nothing is left without them; joint 3 in none."""
+    N = 400
+    v = np.full((N, 3), 0.5)
+    v[: N // 2, 0] = v[:, 1] = 0.01
+    motion = Motion(np.arange(N) * 0.01, 0 * v, v, 0 * v, np.array([0]))
+    model = ReconstructedModel(
+        three_axis(), (), FrictionLaw(((), (), ())), history={"slowest": [0.1, 0.1, 0.1]}
+    )
+    tau = np.full((N, 3), 0.2)
+    tau[: N // 2, 0] = slow_error
+    samples = Samples(motion, tau, np.ones((N, 3), dtype=bool), 0.01)
+    # of a model of nothing all of the torque is left, at any speed
+    assert of_slow_motion(model, samples) == []
+    error = np.full((N, 3), 0.2)
+    error[: N // 2, 0] = slow_error
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("armloop.identification.scoring.residual", lambda model, samples: error)
+        found = of_slow_motion(model, replace(samples, tau=np.ones((N, 3))))
+    assert [words.split(":")[0] for words in found] == (["joint 1"] if told else [])
+    if told:
+        assert found[0].startswith(
+            "joint 1: 65% of the torque, but 20% without samples slower than it slid in training (0.1 rad/s)"
+        )

@@ -19,7 +19,7 @@ def run(options: Evaluate) -> None:
     from armloop.commands.shared import model_and_logs, print_json
     from armloop.data.repeats import require_different
     from armloop.data.signals import preprocess
-    from armloop.identification.scoring import score
+    from armloop.identification.scoring import of_slow_motion, score
     from armloop.reports.tables import ALL_COUNT, score_table
     from armloop.reports.words import wrapped
     from armloop.robot.plausibility import say_implausible
@@ -37,3 +37,5 @@ def run(options: Evaluate) -> None:
         print_json(result.to_dict())
         return
     print(score_table(result, model.arm, units=model.torque_units), wrapped(ALL_COUNT), sep="\n")
+    for words in of_slow_motion(model, samples):
+        print(wrapped(f"note: {words}"))

@@ -21,6 +21,8 @@ from armloop.laws.effects import Context, Effect
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Mask
 
+#: Of an error less than this part is left without what causes most of it.
+_MOSTLY = 0.67
 #: Less than this part of the largest joint's torque is rounding.
 _ROUND_OFF = 1e-9
 
@@ -69,6 +71,21 @@ def score(model: ReconstructedModel, samples: Samples, rows: Mask | None = None)
     chosen = np.ones(samples.motion.samples, dtype=bool) if rows is None else rows
     samples = without_shared_standstill(samples, model)
     return score_errors(residual(model, samples)[chosen], samples.tau[chosen], samples.moving[chosen])
+
+
+def of_slow_motion(model: ReconstructedModel, samples: Samples) -> list[str]:
+    """A sentence on each joint that errs mostly where it slides slower than in training, of which no friction is known."""
+    samples = without_shared_standstill(samples, model)
+    moving, error = samples.moving, residual(model, samples)
+    rows = moving, moving & ~too_slow(model, samples)
+    pairs = zip(*(score_errors(error, samples.tau, kept).moving["nrmse"] for kept in rows), strict=True)
+    return [
+        f"joint {j}: {100 * every:.2g}% of the torque, but {100 * rest:.2g}% without samples slower than it slid in "
+        f"training ({model.history['slowest'][j - 1]:.2g} {model.arm.joints[j - 1].position_unit}/s), of whose friction the "
+        "model knows nothing"
+        for j, (every, rest) in enumerate(pairs, 1)
+        if every is not None and rest is not None and rest < _MOSTLY * every
+    ]
 
 
 def score_errors(error: Array, tau: Array, moving: Mask) -> Score:
