@@ -38,6 +38,9 @@ def test_a_value_ends_where_its_error_begins() -> None:
     assert with_error(0.44982, 0.00071) == "0.44982 ± 0.00071"
     assert with_error([1.0, 2.0], [0.1, 0.02]) == "(1.00 ± 0.10, 2.000 ± 0.020)"
     assert with_error(1.0, float("nan")) == "1.00"
+    # a component that no motion determined is none; of a vector without any error nobody said so
+    assert with_error([1.0, 0.15], [0.1, float("nan")]) == "(1.00 ± 0.10, –)"
+    assert with_error([1.0, 2.0], [float("nan")] * 2) == "(1.00, 2.00)"
 
 
 def test_a_sentence_has_the_signs_of_the_tables() -> None:

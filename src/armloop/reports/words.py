@@ -84,10 +84,17 @@ def vector(value: float | Sequence[float], digits: int = 3) -> str:
 
 
 def with_error(value: float | Sequence[float], std_error: float | Sequence[float]) -> str:
-    """A parameter and its standard error, to the digit at which the error begins."""
+    """A parameter and its standard error, to the digit at which the error begins.
+
+    Of a vector some components of which have an error, the others are not determined, and not written.
+    """
     if isinstance(value, Sequence):
-        errors = std_error if isinstance(std_error, Sequence) else [std_error] * len(value)
-        return "(" + ", ".join(with_error(x, e) for x, e in zip(value, errors, strict=True)) + ")"
+        errors = np.broadcast_to(np.asarray(std_error, dtype=float), len(value)).tolist()
+        lost = np.isnan(errors) & ~np.isnan(errors).all()
+        parts = (
+            MISSING if none else with_error(x, e) for x, e, none in zip(value, errors, lost, strict=True)
+        )
+        return f"({', '.join(parts)})"
     error = float(np.max(std_error))
     if not np.isfinite(error) or error <= 0:
         return number(value)
