@@ -1,4 +1,4 @@
-"""An offset of the torque of a slide that lifts one weight may be a counterweight, and that is said."""
+"""What may be a counterweight, or a balancer that has lost force, is said beside what is stated."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from armloop.diagnosis.reasons import of_a_constant_pull
+from armloop.diagnosis.reasons import of_a_balancer, of_a_constant_pull
 from armloop.laws.effects import Estimate, effect
 from armloop.model import AddedEffect
 from armloop.robot.arm import load_arm
@@ -32,3 +32,27 @@ def test_a_slide_that_lifts_one_weight_may_have_another_counterweight(
         (words,) = found
         assert words.startswith(f"joint {quill} lifts one weight at all postures: a counterweight")
         assert "a constant force of -39.20 ± 0.30 N" in words and "must supply as much in addition" in words
+
+
+@pytest.mark.parametrize(
+    ("joint", "terms", "told"),
+    [
+        (2, ["sin(q2)", "cos(2*q2)"], True),
+        (2, ["sin(q2)*v2"], False),
+        (3, ["sin(q3)"], False),
+        (2, [], False),
+    ],
+)
+def test_a_law_of_the_angle_beside_a_spring_with_levers_may_be_that_spring(
+    joint: int, terms: list[str], told: bool
+) -> None:
+    sizes = {"second": 4.0, "second_phase": 0.1, "third": 1.0, "third_phase": 0.2}
+    spring = AddedEffect(effect("spring_balancer", 2), {k: Estimate(x, 0.1, "") for k, x in sizes.items()})
+    model: Any = SimpleNamespace(effects=(spring,))
+    names = [*terms, "q_low", "v_high"] if terms else []
+    law: Any = SimpleNamespace(joint=joint, parameters={name: Estimate(1.0, 0.1, "N*m") for name in names})
+    found = of_a_balancer(model, [law])
+    assert [
+        words.startswith("joint 2 has a spring that pulls by levers: one that has lost force")
+        for words in found
+    ] == ([True] if told else [])

@@ -124,10 +124,14 @@ def test_of_a_joint_of_which_something_hidden_is_told_nothing_else_is_suspected(
 ) -> None:
     hidden = SimpleNamespace(effect=effect("viscous_friction", joint + 1))
     law = Suspected(effect("coulomb_friction", 2), (1,), 0.8, small=bool(asked), errors=9.0)
-    told = {"of_too_few_logs": ["a model of one log"], "of_a_constant_pull": ["a counterweight"]}
+    told = {
+        "of_too_few_logs": ["a model of one log"],
+        "of_a_constant_pull": ["a counterweight"],
+        "of_a_balancer": ["gas"],
+    }
     answers = Answers(monkeypatch, masked=((hidden, hidden),), suspected=[law], **told)
     reasons = judged(jobs=2).reasons
-    assert "a model of one log" in reasons and "a counterweight" in reasons
+    assert "a model of one log" in reasons and "a counterweight" in reasons and "gas" in reasons
     assert answers.asked["suspected"] == ("account", [], asked)
     assert any("viscous_friction at joint 2 would explain" in reason for reason in reasons) == (not asked)
     (said,) = [

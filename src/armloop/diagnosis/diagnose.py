@@ -37,6 +37,7 @@ from armloop.diagnosis.reasons import (
     event_untold,
     in_doubt,
     masked,
+    of_a_balancer,
     of_a_constant_pull,
     of_too_few_logs,
     standing,
@@ -275,6 +276,6 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             for each in suspected(evidence, outcome.found, unsaid)
         ]
     doubted += [*of_the_temperature(model, outcome.added()), *of_too_few_logs(model, outcome.found)]
-    doubted += of_a_constant_pull(model, outcome.added())
+    doubted += [*of_a_constant_pull(model, outcome.added()), *of_a_balancer(model, laws)]
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -34,9 +34,19 @@ from armloop.identification.shared_motors import sharing
 from armloop.identification.uncertainty import usual_in_words
 from armloop.laws.effects import Effect
 from armloop.laws.effects.events import ends
+from armloop.laws.effects.found import RANGE
+from armloop.laws.effects.spring_balancer import SpringBalancer
 from armloop.laws.effects.torque_offset import TorqueOffset
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Mask
+
+
+class _Law(Protocol):
+    @property
+    def joint(self) -> int: ...
+    @property
+    def parameters(self) -> Mapping[str, Any]: ...
+
 
 #: Fewest moving samples of a joint that has moved.
 _FEWEST = 20
@@ -243,6 +253,19 @@ def of_a_constant_pull(model: ReconstructedModel, added: Sequence[AddedEffect]) 
         f"spring that holds it, is a constant force of {a.parameters['offset'].words()} as well, and no motion tells it "
         "from the sensor; if it is that, a controller must supply as much in addition"
         for a in offsets
+    ]
+
+
+def of_a_balancer(model: ReconstructedModel, laws: Sequence[_Law]) -> list[str]:
+    """A sentence on each law of its own angle alone at a joint that a spring with levers pulls at: it may be the spring."""
+    sprung = {a.effect.joint for a in model.effects if isinstance(a.effect, SpringBalancer)}
+    return [
+        f"joint {law.joint} has a spring that pulls by levers: one that has lost force, or its gas, leaves just such a law "
+        "of the joint's angle alone"
+        for law in laws
+        if law.joint in sprung
+        and law.parameters
+        and not any("v" in name for name in set(law.parameters) - set(RANGE))
     ]
 
 
