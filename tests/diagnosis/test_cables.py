@@ -288,13 +288,19 @@ def test_what_may_run_to_another_link_is_as_uncertain_as_they_are_apart(model: R
     ],
 )
 def test_it_is_taken_if_the_run_is_likelier_with_it_and_no_joint_pays(
-    likelier: tuple[bool, ...], named: bool, costly: bool, taken: bool, monkeypatch: pytest.MonkeyPatch
+    likelier: tuple[bool, ...],
+    named: bool,
+    costly: bool,
+    taken: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    several: int = 2,
 ) -> None:
     rows = np.ones((2, 2), dtype=bool)
     whole: Any = SimpleNamespace(rows=rows, only=lambda rows: None)
     made = SimpleNamespace(added=lambda: ["cable"], effects=[ElasticCable()] if named else [])
     more: Any = SimpleNamespace(outcome=SimpleNamespace(after=made), whole=whole)
-    account: Any = SimpleNamespace(whole=whole, remaining=lambda: "left")
+    found = SimpleNamespace(found=["stop", "spring"][:several])
+    account: Any = SimpleNamespace(whole=whole, remaining=lambda: "left", outcome=found, contacts=[])
     asked = iter(likelier)
     for name, answer in {
         "_is_asked": True,
@@ -312,3 +318,12 @@ def test_it_is_taken_if_the_run_is_likelier_with_it_and_no_joint_pays(
         monkeypatch.setattr(cables, name, lambda *given, answer=answer: answer)
     monkeypatch.setattr(cables, "_is_likelier", lambda *given: next(asked))
     assert (cables.account_with_cable(whole, account, lambda text: None, 1) is more) == taken
+
+
+def test_one_thing_that_was_found_is_no_cable_unless_one_is_beside_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A torque that grows with the square of the angle is as near a stop as the model itself is."""
+    judged = test_it_is_taken_if_the_run_is_likelier_with_it_and_no_joint_pays
+    judged((False, True, True), True, False, False, monkeypatch, several=1)
+    judged((True, True), True, False, True, monkeypatch, several=1)

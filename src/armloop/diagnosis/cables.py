@@ -68,8 +68,10 @@ def account_with_cable(
         return None
     rows = plain.rows & account.whole.rows
     least = posterior(account, account.remaining(), rows)
-    # what was found may be there beside it, or be what stood in its place
-    tried = [(each, with_account(plain, [cable], each)) for each in (account, _of_nothing(account))]
+    # what was found may be there beside it, or be, if it is several things, what stood in its place
+    several = len(account.outcome.found) + len(account.contacts) > 1
+    accounts = [account, _of_nothing(account)] if several else [account]
+    tried = [(each, with_account(plain, [cable], each)) for each in accounts]
     likelier = (
         known for each, known in tried if _is_likelier(_alone(each, plain, cable, known), rows, least)
     )

@@ -10,10 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from armloop.data.blocks import widened
 from armloop.data.creep import TRAVEL, may_stick
 from armloop.data.motion import Samples
-from armloop.dynamics import ModelEquations
 from armloop.laws.friction import Direction
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Mask, stretches
@@ -54,6 +52,9 @@ def _shared(model: ReconstructedModel) -> list[tuple[Direction, float]]:
     """Directions that two joints share, with the level of dry friction along each; none of a model that is no law."""
     if not any(added.effect.other_joint for added in model.effects):
         return []
+    # what refuses a command for want of a file comes by here, and has no need of it
+    from armloop.dynamics import ModelEquations
+
     try:
         equations = ModelEquations(model, MATH, sharp=True)
     except ModelError:  # an effect of one's own that is no law of the state
@@ -65,6 +66,8 @@ def _shared(model: ReconstructedModel) -> list[tuple[Direction, float]]:
 
 def _stands_still(along: Direction, model: ReconstructedModel, samples: Samples) -> Mask:
     """(N,) samples in which next to nothing turns along a direction, or within the filter's reach of such."""
+    from armloop.data.blocks import widened
+
     motion, how, n = samples.motion, model.conditioning, model.arm.n
     half, fastest = np.asarray(
         model.history.get("range") or [np.full(n, _HALF), np.full(n, np.inf)], dtype=float

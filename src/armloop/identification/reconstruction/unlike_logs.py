@@ -35,6 +35,8 @@ def unlike(whole: PlainFits, logs: Mapping[str, Sequence[MotionLog]], arm: Arm, 
     """
     each = {name: PlainFits.of(runs, arm, cutoff_hz) for name, runs in logs.items()} if len(logs) > 1 else {}
     told = {name: own for name, own in each.items() if own is not None}
+    if len(told) < 2:
+        return ""
     theta, _ = whole.solved(whole.table.tau, whole.table.moving)
     usual = whole.table.sizes(whole.table.tau, whole.table.moving)
     found = {name: _left(own, theta, usual) for name, own in told.items()}
