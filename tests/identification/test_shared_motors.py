@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
+from armloop.api.score import Comparison
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose
@@ -18,6 +19,8 @@ from armloop.identification.reconstruction import Options, reconstruct
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.scoring import score
 from armloop.identification.shared_motors import sharing, without_shared_standstill
+from armloop.identification.validation.crossvalidate import _judge
+from armloop.identification.validation.splits import Split
 from armloop.laws.effects import Estimate, effect, hypotheses
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
@@ -167,6 +170,10 @@ def test_an_arm_whose_shared_motor_rests_is_learnt_and_judged_without_that(seed:
     evidence = Evidence.of(made.model, samples, hypotheses(made.model.arm))
     assert evidence.rows[:, 0].any() and not evidence.rows[:, 1:].any()
     assert score(made.model, samples).moving["rmse"][1:] == [None, None]
+    assert Comparison.of(made.model, run).moving.any(axis=0).tolist() == [True, False, False]
+    split = Split("level", [], {0: np.array([[0.0, 20.0]])})
+    ((_, (_, _, moving)),) = _judge(split, [run], made.model)
+    assert moving.any(axis=0).tolist() == [True, False, False]
     found = diagnose(made.model, [run])
     assert found.verdict == "no_effect"
     assert [

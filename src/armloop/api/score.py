@@ -16,6 +16,7 @@ from armloop.data.motion import Samples
 from armloop.data.signals import preprocess
 from armloop.identification.scoring import Score as Numbers
 from armloop.identification.scoring import residual, score
+from armloop.identification.shared_motors import without_shared_standstill
 from armloop.identification.validation.misrecorded import say_misrecorded
 from armloop.model import ReconstructedModel
 from armloop.reports.tables import score_table
@@ -112,7 +113,7 @@ class Comparison:
     @staticmethod
     def of(model: ReconstructedModel, logs: MotionLog | Sequence[MotionLog]) -> Comparison:
         """Ask a model about the samples of logs; see :meth:`armloop.Model.compare`."""
-        samples = samples_for(model, as_logs(logs))
+        samples = without_shared_standstill(samples_for(model, as_logs(logs)), model)
         motion, predicted = samples.motion, samples.tau - residual(model, samples)
         state = motion.time, motion.starts, motion.q, motion.v, motion.vdot
         return Comparison(*state, samples.tau, predicted, samples.moving, tuple(model.torque_units))

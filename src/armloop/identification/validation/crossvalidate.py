@@ -13,6 +13,7 @@ from armloop.data.repeats import require_different
 from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.identification.scoring import Score, residual, score_errors
+from armloop.identification.shared_motors import without_shared_standstill
 from armloop.identification.validation.splits import Split, by_blocks, by_file, judging_rows, told_apart
 from armloop.model import ReconstructedModel, model_of
 from armloop.robot.arm import Arm
@@ -168,7 +169,7 @@ _Judged = tuple[Array, Array, Mask]
 def _judge(split: Split, logs: Sequence[MotionLog], model: ReconstructedModel) -> list[tuple[int, _Judged]]:
     found = []
     for k, blocks in split.left_out.items():
-        samples = preprocess([logs[k]], model.conditioning)
+        samples = without_shared_standstill(preprocess([logs[k]], model.conditioning), model)
         # unfiltered samples are numbered; where they lie in the log is its time
         time = samples.motion.time if samples.cutoff_hz > 0 else logs[k].time
         rows = judging_rows(time, samples, blocks)
