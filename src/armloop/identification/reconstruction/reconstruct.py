@@ -225,7 +225,7 @@ def reconstruct(
             progress("what was found has a part in when the torque seems to be recorded: anew beside it")
         if shared:
             progress(
-                "what motors hold that two joints share, while they stand still, tells nothing: anew without it"
+                "samples in which a motor that two joints share stands still tell nothing: anew without them"
             )
         if again is not None or shared:
             view = partial(without_shared_standstill, model=seen) if shared else None
