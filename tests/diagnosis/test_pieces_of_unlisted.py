@@ -162,7 +162,6 @@ class TestLawThatIsNotListed:
             evidence: Any = SimpleNamespace(
                 scale=np.ones(2),
                 samples=SimpleNamespace(motion=SimpleNamespace(joints=2)),
-                variation=np.array([1.0, 1.5]),
             )
             found_law, after = unlisted.find_law(evidence, with_effects, lambda text: None)  # type: ignore[arg-type]
             assert (found_law is None) == (after is with_effects)
@@ -172,14 +171,26 @@ class TestLawThatIsNotListed:
         assert verdict(101.0, named, []) == "law at joint 2" and asked == [1]
         assert verdict(201.0, named, [], rest=150.0) == "law at joint 2"
         assert verdict(201.0, named, [], rest=151.0) == "effects"
-        # no more than the baseline: asked where several effects left so little; of one, what is more than its worst
+        # no more than the baseline: asked where several effects left so little
         assert verdict(99.0, named, []) == "effects" and asked == [1]
-        assert verdict(150.0, named[:1], []) == "effects" and asked == []
-        assert verdict(151.0, named[:1], []) == "effects" and asked == [1]
+        assert verdict(100.0, named[:1], []) == "effects" and asked == []
+        assert verdict(101.0, named[:1], []) == "effects" and asked == [1]
         assert verdict(155.0, named, [], "v2") == "effects"  # dry and viscous friction are listed
         # an effect of the whole arm goes with them: a law of one joint cannot take its place
         assert verdict(155.0, [*named, arm], []) == "effects" and asked == []
         assert verdict(155.0, [*named, arm], [arm]) == "law at joint 2"
+
+    @pytest.mark.parametrize(("mean", "above"), [(1.0, False), (1.3, False), (1.35, True), (0.5, False)])
+    def test_one_effect_leaves_more_than_the_baseline_by_more_than_a_standard_error(
+        self, mean: float, above: bool
+    ) -> None:
+        """Of ten blocks of ten rows, in half of which a unit more is left than in the others."""
+        block = np.arange(100) // 10
+        left = np.where(block % 2, mean + 1.0, np.maximum(mean - 1.0, 0.0))
+        left *= mean / left.mean()
+        assert (
+            unlisted._above_baseline(Score.of(1, np.sqrt(left), np.zeros(100, dtype=int), block, 1)) == above
+        )
 
     def test_every_function_that_is_sought_can_be_stated(self) -> None:
         names = unlisted.names_of(unlisted.library_of((True, True, False)), 1)

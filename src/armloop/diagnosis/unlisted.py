@@ -24,6 +24,7 @@ from armloop.diagnosis.judgement import (
     enough,
     gain,
     lead,
+    lead_of,
     much_is_left,
 )
 from armloop.diagnosis.lasting import FEWEST, lasting
@@ -123,8 +124,8 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
 
     Effects that were only the nearest names for a law that is not listed are struck off: those that leave most of
     what they were to explain, and those for which a law of no more parameters explains far more: the latter even if what
-    they leave is no more than the baseline at its worst, if they are several of one joint, for these bend to much. A single
-    one stays then: what a law removes beside it is what the model lacks on any day. Effects stay that with a law beside
+    they leave is no more than the baseline, if they are several of one joint, for these bend to much. A single one stays
+    then: what a law removes beside it is what the model lacks on any day. Effects stay that with a law beside
     them, fitted together, are no more parameters than one law in place of both.
 
     Args:
@@ -180,9 +181,8 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
         rows = outcome.after.score.rows[j]
         if not there or len(there) != len(outcome.found) - len(bare.found) or rows < FEWEST:
             continue
-        score = outcome.after.score
-        if len(there) == 1 and score.energy[j] <= enough(evidence, score)[j]:
-            continue  # no more than the baseline at its worst
+        if len(there) == 1 and not _above_baseline(outcome.after.score.of_joint(j)):
+            continue
         progress(f"joint {j + 1}: whether a law that is not listed does better than what was found there")
         law = law_left(evidence, bare.after, j)
         if not _is_simpler(evidence, law, outcome, bare, j):
@@ -190,6 +190,12 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
         if len(there) > 1 or not _does_as_well(evidence, bare, there[0].rivals, law, j):
             return _in_place(evidence, outcome, bare, law, j)
     return None, outcome
+
+
+def _above_baseline(score: Score) -> bool:
+    """Whether what is left of one joint is more than the baseline, by more than a standard error over blocks."""
+    (errors,), (counts,) = score.errors, score.counts
+    return lead_of(errors, counts.astype(float), counts) > 1.0
 
 
 def _in_place(

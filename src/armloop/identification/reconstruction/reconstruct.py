@@ -43,7 +43,7 @@ from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.reconstruction.torque_lag import Beside
 from armloop.identification.scoring import Score, residual
-from armloop.identification.shared_motors import without_shared_standstill
+from armloop.identification.shared_motors import sharing, without_shared_standstill
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
 from armloop.model.added_effect import ripples
@@ -219,7 +219,7 @@ def reconstruct(
     if method != REFERENCE:
         _find_ripple(_chosen(tried), ready.logs)
         again, seen = _in_step(ready, _chosen(tried), partial(preparing, arm=arm)), _chosen(tried).model()
-        shared = any(added.effect.other_joint and added.effect.passive for added in seen.effects)
+        shared = any(sharing(seen, j) for j in range(arm.n))
         if again is not None:
             ready = again
             progress("what was found has a part in when the torque seems to be recorded: anew beside it")
