@@ -235,16 +235,22 @@ def test_within_a_log_its_friction_does_not_differ() -> None:
 
 
 @pytest.mark.parametrize(
-    ("samples", "counts", "told"), [(1000, 50, True), (1000, 49, False), (5000, 100, True), (5000, 99, False)]
+    ("turns", "counts", "told"), [(1000, 50, True), (1000, 49, False), (5000, 100, True), (5000, 99, False)]
 )
-def test_a_joint_of_which_few_samples_count_is_not_judged(samples: int, counts: int, told: bool) -> None:
-    """A twentieth of those that are no closer than the filter can tell apart, or a hundred."""
-    rows = np.zeros((2 * samples, 2), dtype=bool)
-    rows[:counts, 0] = rows[:, 1] = True
-    every: Any = SimpleNamespace(N=2 * samples)
+def test_a_joint_that_turns_while_few_samples_count_is_not_judged(
+    turns: int, counts: int, told: bool
+) -> None:
+    """A twentieth of those in which it turns, no closer than the filter can tell apart, or a hundred; one that rests may."""
+    N = 12000
+    v = np.zeros((N, 3))
+    v[: 2 * turns, 0], v[:, 1], v[:20, 2] = 0.5, 0.5, 0.5
+    rows = np.zeros((N, 3), dtype=bool)
+    rows[:counts, 0] = rows[:, 1] = rows[:10, 2] = True
+    model: Any = SimpleNamespace(history={}, arm=SimpleNamespace(n=3))
+    run: Any = SimpleNamespace(motion=SimpleNamespace(v=v))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evidence, "independent_rows", lambda samples: np.arange(samples.N) % 2 == 0)
-        assert evidence.seldom(every, rows).tolist() == [not told, False]
+        patch.setattr(evidence, "independent_rows", lambda samples: np.arange(N) % 2 == 0)
+        assert evidence.seldom(model, run, rows).tolist() == [not told, False, False]
 
 
 def test_no_row_of_such_a_joint_counts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -253,5 +259,5 @@ def test_no_row_of_such_a_joint_counts(monkeypatch: pytest.MonkeyPatch) -> None:
         [measured(motion_of(3, 5.0), torque(motion_of(3, 5.0)), 3, 0.01)], model.conditioning
     )
     assert Evidence.of(model, samples, []).rows.any(axis=0).tolist() == [True, True, True]
-    monkeypatch.setattr(evidence, "seldom", lambda samples, rows: np.array([False, True, False]))
+    monkeypatch.setattr(evidence, "seldom", lambda model, samples, rows: np.array([False, True, False]))
     assert Evidence.of(model, samples, []).rows.any(axis=0).tolist() == [True, False, True]

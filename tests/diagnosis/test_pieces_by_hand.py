@@ -274,7 +274,7 @@ class TestWhatIsKnownOfARun:
         given = motion(40, 3)
         monkeypatch.setattr(evidence, "_sliding", lambda samples, model: np.ones((40, 3), dtype=bool))
         monkeypatch.setattr(evidence, "independent_rows", lambda samples: np.ones(40, dtype=bool))
-        model: Any = SimpleNamespace(baseline={}, history={}, uncertainty={}, effects=())
+        model: Any = SimpleNamespace(baseline={}, history={}, uncertainty={}, effects=(), arm=an_arm())
         model.context = lambda motion, effects: Context(an_arm(), motion, period=0.25)
         tau = np.zeros((40, 3))
         tau[:, 1:] = [3.0, 4.0]

@@ -219,7 +219,7 @@ class TestReasons:
         monkeypatch.setattr(reasons, "far_outside", lambda motion, ranges: far)
         monkeypatch.setattr(reasons, "too_slow", lambda model, samples: np.zeros((50, 3), dtype=bool))
         monkeypatch.setattr(reasons, "sliding", lambda samples, model: slides)
-        monkeypatch.setattr(reasons, "seldom", lambda samples, rows: np.arange(3) == of.get("seldom"))
+        monkeypatch.setattr(reasons, "seldom", lambda model, samples, rows: np.arange(3) == of.get("seldom"))
         monkeypatch.setattr(reasons, "sharing", lambda model, j: of.get("shares", []))
         monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
         monkeypatch.setattr(
@@ -297,14 +297,13 @@ class TestReasons:
         words, _ = self.standing(monkeypatch, [0.5, None, 0.5], slides=20, counts=19, seldom=1)
         (said,) = words
         assert said.startswith(
-            "joint 2 turns round as soon as its torque can be told from that of the turn, and slides"
+            "joint 2 counts in but 20 samples, while it turns in far more: it turns round before"
         )
         words, _ = self.standing(monkeypatch, [0.5, 0.5, None], seldom=2, far=10)
         assert len(words) == 1  # that of what lies outside: enough of the joint counts
-        assert reasons._seldom(0, 0.3).startswith(
-            "joint 1 turns round as soon as its torque can be told from that of the turn, or is where it was "
-            "not trained (30%)"
-        )
+        # what slides beyond the trained range alone is said to do that
+        every, none = np.ones(40, dtype=bool), np.zeros(40, dtype=bool)
+        assert "slides only beyond 1.2 times" in reasons._uncounted(0, every, every, none, few=True)
 
     def test_a_joint_of_which_next_to_nothing_counts_is_said_to_slide_where_it_does(
         self, monkeypatch: pytest.MonkeyPatch

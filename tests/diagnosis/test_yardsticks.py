@@ -172,7 +172,7 @@ def test_a_model_without_a_baseline_is_weighed_by_the_torque() -> None:
             history={},
             uncertainty={},
             context=lambda motion, effects: context,
-            arm=None,
+            arm=SimpleNamespace(n=2),
             effects=(),
         )
         return Evidence.of(model, given, [])

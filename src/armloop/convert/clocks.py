@@ -12,7 +12,7 @@ from armloop.convert.recording import Array
 from armloop.data.log import GAP_PERIODS
 
 # A date in whatever order, or none, and a time of day: 31.03.2024 23:59:58,25, 3/31/2024 11:59:58 PM, 23:59:58.250.
-_TIME_OFDAY = re.compile(r"(?:([\d./-]+)[T ] ?)?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?) ?([AaPp]\.?[Mm]\.?)?")
+_TIME_OF_DAY = re.compile(r"(?:([\d./-]+)[T ] ?)?(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?) ?([AaPp]\.?[Mm]\.?)?")
 DAY, _HOUR = 86400.0, 3600.0
 _COUNTED = "dates or times of day, counted in s from the first row"
 # A stamp in two columns, as ROS has it: header.stamp.sec and header.stamp.nanosec.
@@ -67,7 +67,7 @@ def _of_texts(texts: Sequence[str]) -> Array | None:
     seconds = np.empty(len(texts))
     dates = []
     for row, text in enumerate(texts):
-        found = _TIME_OFDAY.fullmatch(text.strip())
+        found = _TIME_OF_DAY.fullmatch(text.strip())
         if found is None:
             return None
         date, hours, minutes, rest, half = found.groups()

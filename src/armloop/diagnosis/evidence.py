@@ -37,8 +37,8 @@ FOLDS = 2
 _SHORTEST, _REMEMBERED = (0.75, 1.0), 0.1
 #: Below this part of its largest speed a joint may be at rest, pushed about within its friction.
 STILL = 0.01
-#: A joint of which less than this part of the samples counts is judged by so many of them at least: of one
-#: that turns round as soon as the filter has settled, a law would be fitted to a few moments of its fastest swings.
+#: A joint is not judged if less than this part of the samples in which it turns counts, and fewer than so many: of one that
+#: turns round as soon as the filter has settled, a law would be fitted to a few moments of its fastest swings.
 _SELDOM, _ENOUGH = 0.05, 100
 #: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
 FEWEST_BLOCKS = 8
@@ -128,7 +128,7 @@ class Evidence:
         rows = sliding(samples, model)
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples)
         rows &= ~samples.at_an_end[:, None]
-        rows &= ~seldom(samples, rows)
+        rows &= ~seldom(model, samples, rows)
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(
             model, samples, scale, variation, rows, blocks, context, asked, unknown, assumed=assumed
@@ -334,10 +334,10 @@ def far_outside(motion: Motion, ranges: Any) -> Mask:
     return np.asarray(np.any([np.abs(x) > FAR * np.maximum(size, 1e-9) for x, size in parts], axis=0))
 
 
-def seldom(samples: Samples, rows: Mask) -> Mask:
-    """(n,) joints of which so few samples (N, n) count that what they show there may be anything of their turns."""
-    every = np.count_nonzero(independent_rows(samples))
-    return np.asarray(rows.sum(axis=0) < min(_ENOUGH, _SELDOM * every))
+def seldom(model: ReconstructedModel, samples: Samples, rows: Mask) -> Mask:
+    """(n,) joints of which so few of the samples (N, n) in which they turn count that these may be anything of their turns."""
+    turns = (np.abs(samples.motion.v) > sticking(model)) & independent_rows(samples)[:, None]
+    return np.asarray(rows.sum(axis=0) < np.minimum(_ENOUGH, _SELDOM * turns.sum(axis=0)))
 
 
 def near_standstill(samples: Samples) -> Mask:

@@ -93,7 +93,7 @@ def standing(
     far = strays.mean(axis=0)
     slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
     slides = sliding(samples, model)
-    few = seldom(samples, slides & ~strays & ~creeps)
+    few = seldom(model, samples, slides & ~strays & ~creeps)
     reasons = [*_outside(outside, far), *_slow(model, slow)]
     unknown, unexplained, judged = False, [], 0
     multiples: list[bool | None] = []
@@ -102,9 +102,7 @@ def standing(
         if evidence.rows[:, j].sum() < _FEWEST:
             turns = np.abs(samples.motion.v[:, j]) > sticking(model)[j]
             sharers = sharing(model, j) if turns.sum() >= _FEWEST else []
-            uncounted = _uncounted(j, slides[:, j], strays[:, j], creeps[:, j], sharers)
-            rare = few[j] and slides[:, j].sum() >= _FEWEST
-            reasons.append(_seldom(j, float(strays[:, j].mean())) if rare else uncounted)
+            reasons.append(_uncounted(j, slides[:, j], strays[:, j], creeps[:, j], sharers, bool(few[j])))
             continue
         poor = _too_poor(model, j)
         if poor:
@@ -296,20 +294,14 @@ def event_untold(event: AddedEffect) -> str:
     )
 
 
-def _seldom(j: int, far: float) -> str:
-    """A sentence on a joint that slides too seldom where the model was trained; a part of its samples is far from there."""
-    beyond = f", or is where it was not trained ({far:.0%})" if far > WORTH_A_WORD else ""
-    return (
-        f"joint {j + 1} turns round as soon as its torque can be told from that of the turn{beyond}, and slides in but few "
-        "samples: nothing can be said of it"
-    )
-
-
-def _uncounted(j: int, slides: Mask, strays: Mask, creeps: Mask, sharers: Sequence[int] = ()) -> str:
+def _uncounted(
+    j: int, slides: Mask, strays: Mask, creeps: Mask, sharers: Sequence[int] = (), few: bool = False
+) -> str:
     """Why next to nothing counts of a joint, by its samples (N,).
 
     Args:
         sharers: joints (0-based) that share a motor with it, where it turns all the same.
+        few: whether what counts is but a few moments between its turns.
     """
     if slides.sum() < _FEWEST:
         if sharers:
@@ -322,6 +314,12 @@ def _uncounted(j: int, slides: Mask, strays: Mask, creeps: Mask, sharers: Sequen
         where = f"beyond {FAR:g} times the range the model was trained on"
     elif (slides & ~strays & ~creeps).sum() < _FEWEST:
         where = f"slower than it was trained at, or beyond {FAR:g} times the range"
+    elif few:
+        counts = int((slides & ~strays & ~creeps).sum())
+        return (
+            f"joint {j + 1} counts in but {counts} samples, while it turns in far more: it turns round before its torque "
+            "can be told from that of the turn, or is where the model was not trained; nothing can be said of it"
+        )
     else:
         return f"joint {j + 1} slides only within events: nothing else can be said of it"
     return f"joint {j + 1} slides only {where}: nothing can be said of it"
