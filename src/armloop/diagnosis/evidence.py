@@ -335,7 +335,7 @@ def far_outside(motion: Motion, ranges: Any) -> Mask:
 
 
 def seldom(model: ReconstructedModel, samples: Samples, rows: Mask) -> Mask:
-    """(n,) joints of which so few of the samples (N, n) in which they turn count that these may be anything of their turns."""
+    """(n,) joints of which, of all samples in which they turn, so few count (N, n) that these may be anything of a turn."""
     turns = (np.abs(samples.motion.v) > sticking(model)) & independent_rows(samples)[:, None]
     return np.asarray(rows.sum(axis=0) < np.minimum(_ENOUGH, _SELDOM * turns.sum(axis=0)))
 
