@@ -194,6 +194,14 @@ class TestIntervalOfAPush:
         assert self.found((60, 90), silent=(30, 65)) == (65, 100)
         assert self.found((60, 90), silent=(85, 130)) == (50, 85)
 
+    def test_it_goes_on_while_its_joints_rest_if_it_shows_again_as_they_set_out(self) -> None:
+        # for half a second and more, which is longer than it is sought to both sides where every sample tells
+        assert self.found((60, 90), true=(50, 180), silent=(100, 160)) == (50, 180)
+        assert self.found((170, 190), true=(50, 180), silent=(70, 160)) == (50, 180)
+        assert self.found((60, 90), true=(50, 150), silent=(100, 160)) == (50, 100)
+        # 0.3 s of samples that tell, no more
+        assert self.found((70, 90), true=(50, 200), silent=(100, 160)) == (50, 180)
+
     def test_its_size_is_that_of_its_middle(self) -> None:
         # the reach, but no more than a fifth, is left aside at each end: of 20 samples four
         assert self.found((90, 96), true=(90, 93)) == (90, 96)  # an instant is none

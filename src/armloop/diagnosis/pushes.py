@@ -367,18 +367,14 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
 
     A burst's edges are where the novelty falls, and how the arm moves can make it fall within a push.
     """
-    motion = evidence.samples.motion
-    run = motion.run_of(burst.start)
-    period = evidence.samples.period
     # The filter has smeared an event's edges.
-    inner = round(min(evidence.samples.reach / period, 0.2 * (burst.stop - burst.start)))
-    margin = round(PAUSE / period)
+    inner = round(min(evidence.samples.reach / evidence.samples.period, 0.2 * (burst.stop - burst.start)))
     middle = slice(burst.start + inner, burst.stop - inner)
     if middle.stop - middle.start < 4:
         return burst
     _, columns, y = _burst(evidence, residual, weight, middle, kind)
     size = event_size(columns, y)
-    near = slice(max(run.start, burst.start - margin), min(run.stop, burst.stop + margin))
+    near = _near(evidence, burst, (weight[:, columns.any(axis=(0, 2))] > 0).any(axis=1))
     _, columns, y = _burst(evidence, residual, weight, near, kind)
     # Half of it explains a sample as well as nothing or all does: what comes and goes smoothly counts from there.
     removed = (y**2 - (y - columns @ size) ** 2).sum(axis=1)
@@ -389,6 +385,19 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
     end = int(np.argmax(running - least))
     start = end - int(np.argmin(running[end::-1]))
     return slice(near.start + start, near.start + end) if end - start >= 4 else burst
+
+
+def _near(evidence: Evidence, burst: slice, tells: Mask) -> slice:
+    """A burst with as much to both sides, of its run, as holds samples that tell (N,) for so long as events are apart.
+
+    An event that goes on while its joints rest shows again as they set out.
+    """
+    run, margin = evidence.samples.motion.run_of(burst.start), max(1, round(PAUSE / evidence.samples.period))
+    before = np.flatnonzero(tells[run.start : burst.start])[-margin:]
+    after = np.flatnonzero(tells[burst.stop : run.stop])[:margin]
+    start = run.start + int(before[0]) if len(before) == margin else run.start
+    stop = burst.stop + int(after[-1]) + 1 if len(after) == margin else run.stop
+    return slice(start, stop)
 
 
 def _rise(evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind) -> float:
