@@ -39,3 +39,10 @@ def test_others_prove_nothing(body):
 def test_inertia_beside_the_links_counts():
     assert certificate(links(0.1), effects=(drive(0.01),)) == BODIES
     assert certificate(links(0.1), effects=(drive(-0.01),)) == ""
+
+
+def test_a_law_may_depend_on_the_yaw_where_links_must_not():
+    """A motor ripples wherever the first joint stands; links turned about the vertical feel no difference."""
+    ripple = ("torque_ripple", 1, {"amplitude": 5.0, "order": 22.0, "phase": 0.0})
+    checks = check_physics(model_of(ARM, links(0.1), effects=(ripple,)))
+    assert checks.yaw is not None and checks.yaw < 1e-9 and checks.level

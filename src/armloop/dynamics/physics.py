@@ -311,6 +311,8 @@ def _driving(
 
 
 def _yaw(model: ReconstructedModel, low: Array, high: Array, rng: np.random.Generator) -> float:
+    """Part by which the torques of links and friction change with q1; what a named effect does may well depend on it."""
+    model = replace(model, effects=())
     n, trained = model.arm.n, model.history.get("range")
     size = np.ones((3, n)) if trained is None else np.array(trained, dtype=float)
     q = rng.uniform(low, high, (_MOTIONS, n))

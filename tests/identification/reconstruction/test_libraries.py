@@ -105,6 +105,9 @@ def test_what_is_no_arm_is_not_taken_however_little_it_leaves() -> None:
     assert taken(entry("a", 0.01, 9, BAD), entry("b", 0.02, 9, GOOD)) == "b"
     # none is: the best one, with its faults told
     assert taken(entry("a", 0.01, 9, BAD), entry("b", 0.02, 9, BAD)) == "a"
+    # and before that the one that is nearest to an arm
+    worse = replace(BAD, driving=(0.5,))
+    assert taken(entry("a", 0.01, 9, worse), entry("b", 0.02, 9, BAD)) == "b"
 
 
 def test_the_simpler_is_taken_where_the_difference_is_within_its_scatter() -> None:

@@ -178,9 +178,9 @@ class Contender:
         return float(np.mean(known)) if known else float("inf")
 
     @property
-    def passed(self) -> bool:
-        """Whether it obeys physics."""
-        return self.checks is not None and self.checks.passed
+    def faults(self) -> int:
+        """How many of the checks of physics it does not pass."""
+        return len(self.checks.faults()) if self.checks is not None else 0
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
@@ -229,7 +229,8 @@ def choose(tried: Sequence[Contender]) -> list[Contender]:
         reasons = dict.fromkeys(one.refused for one in tried)
         each = (f"{', '.join(o.name for o in tried if o.refused == why)}: {why}" for why in reasons)
         raise InputError("; ".join(each))
-    eligible = [one for one in made if one.passed] or made
+    fewest = min(one.faults for one in made)
+    eligible = [one for one in made if one.faults == fewest]
     best = min(eligible, key=lambda one: one.error)
     simpler = [one for one in eligible if one.complexity < best.complexity and _no_worse(one, best)]
     taken = min(simpler, key=lambda one: one.complexity, default=best)
@@ -258,11 +259,11 @@ def comparison_notes(tried: Sequence[Contender]) -> list[str]:
         reason = "the logs are too short to judge it by"
     else:
         reason = "the only one that the logs can determine"
-    if any(one.passed and one.error < taken.error for one in others):
+    if any(not one.faults and one.error < taken.error for one in others):
         parts.append("the simplest of those that leave as little within the difference's standard error")
     notes = [f"library {taken.name}: {reason}; {', '.join(parts)}"]
     for one in others:
-        if one.checks is not None and not one.passed and one.error < taken.error:
+        if one.checks is not None and not not one.faults and one.error < taken.error:
             notes.append(f"{one.name} leaves less but is no arm: {'; '.join(one.checks.faults())}")
     return notes
 
