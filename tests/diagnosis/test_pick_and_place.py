@@ -144,13 +144,14 @@ class TestListedEffectsBeforeALaw:
     def chosen(monkeypatch: pytest.MonkeyPatch, left: float, **of: Any) -> tuple[str, Any]:
         """What is kept, and what was barred: effects leave ``left``, a law or the first search ``first`` (one baseline)."""
         blocks, first_left = np.repeat(np.arange(10), 4), of.get("first", 1.0)
+        joint = np.zeros(40, dtype=int)
 
-        def outcome(name: str, held_out: float) -> Any:
+        def outcome(name: str, held_out: float, *found: str) -> Any:
             wavy = held_out * (1 + 0.2 * np.sin(np.arange(40)))
             score = SimpleNamespace(energy=np.array([(wavy**2).sum(), 0.0]), rows=np.array([40, 0]))
-            stacked = SimpleNamespace(block=blocks, joint=np.zeros(40, dtype=int), joints=1)
+            stacked = SimpleNamespace(block=blocks, joint=joint, joints=1)
             return SimpleNamespace(
-                name=name, after=SimpleNamespace(stacked=stacked, held_out=wavy, score=score)
+                name=name, found=found, after=SimpleNamespace(stacked=stacked, held_out=wavy, score=score)
             )
 
         def effect(name: str, joint: int) -> Any:
@@ -161,9 +162,11 @@ class TestListedEffectsBeforeALaw:
         found: Any = SimpleNamespace(found=[offset, spring] if of.get("there", True) else [offset])
         asked: list[Any] = []
 
-        def search(evidence: Any, progress: Any, panel: Any, barred: Any) -> Any:
-            asked.append(barred)
-            return outcome("listed", left)
+        def search(evidence: Any, progress: Any, panel: Any, barred: Any, most: int, worth: Any) -> Any:
+            asked.append((barred, most))
+            others = outcome("listed", left, "offset", "tilt")
+            found = worth(Score.of(1, others.after.held_out, joint, blocks, 1))
+            return others if found else outcome("nothing", 9.0)
 
         monkeypatch.setattr(accounts, "search", search)
         monkeypatch.setattr(
@@ -181,7 +184,7 @@ class TestListedEffectsBeforeALaw:
         return kept.outcome.name, asked
 
     def test_they_are_named_if_they_leave_no_more(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        assert self.chosen(monkeypatch, 1.0) == ("listed", [[("joint_spring", 1, None)]])
+        assert self.chosen(monkeypatch, 1.0) == ("listed", [([("joint_spring", 1, None)], 4)])
         assert self.chosen(monkeypatch, 1.3)[0] == "first"
 
     def test_not_if_they_too_need_a_law(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -199,6 +202,7 @@ class TestListedEffectsBeforeALaw:
         assert self.chosen(monkeypatch, np.sqrt(5.4 / 1.02), first=first, stated=False)[0] == "listed"
         assert self.chosen(monkeypatch, np.sqrt(5.6 / 1.02), first=first, stated=False)[0] == "first"
         assert self.chosen(monkeypatch, 0.5, first=1.9, stated=False) == ("first", [])
+        assert self.chosen(monkeypatch, 0.5, first=2.1, stated=False)[1][0][1] == 3
         assert self.chosen(monkeypatch, 0.5, first=2.1, stated=False)[0] == "listed"
 
 

@@ -112,6 +112,25 @@ class TestSearch:
     def found(search: Any) -> list[str]:
         return [str(f.effect) for f in search.outcome().found]
 
+    def test_no_more_are_sought_than_asked_for(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        left = {"": 900.0, "a1": 500.0, "a1 b1": 300.0, "a1 b1 c1": 20.0}
+        search = self.search(monkeypatch, left)
+        assert self.found(search) == ["a1", "b1", "c1"]
+        search.most = 2
+        assert self.found(search) == ["a1", "b1"]
+        search.most = 1
+        assert self.found(search) == ["a1"]
+
+    def test_a_likeliest_set_that_is_not_worth_stating_is_not_settled(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        search = self.search(monkeypatch, {"": 900.0, "a1": 500.0, "a1 b1": 300.0})
+        search.worth = lambda left: left.error < 301.0
+        assert self.found(search) == ["a1", "b1"]
+        search.worth = lambda left: left.error < 299.0
+        monkeypatch.setattr(search, "_settled", pytest.fail)
+        assert self.found(search) == []
+
     @pytest.mark.parametrize(("pair", "exchanged"), [("z1 w1", True), ("c1 d1", False), ("z1 d1", True)])
     def test_two_of_a_joint_are_exchanged_for_two_between_which_one_lay(
         self, pair: str, exchanged: bool, monkeypatch: pytest.MonkeyPatch

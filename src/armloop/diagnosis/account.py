@@ -92,7 +92,8 @@ class Account:
 
         One effect may lie between two that are there, and a forward search that took it cannot reach them. It is asked
         where a law took the place of some of what was found, or was put beside it: then others must leave no more; and
-        where what was found leaves a multiple of the baseline: then they must leave far less of that.
+        where what was found leaves a multiple of the baseline: then they must leave far less of that. They are one more
+        than what is there, at most: two in the place of one.
 
         Args:
             first: what the search found.
@@ -106,16 +107,20 @@ class Account:
         if not there or (self.unlisted is None and not much_is_left(left)[j]):
             return self
         progress(f"joint {j + 1}: whether other listed effects do better than {there[0].label()}")
-        again = search(evidence, progress, panel, barred=[there[0].place])
-        law, outcome = find_law(evidence, again, progress)
-        if law is not None:
-            return self
+        mine = self.score(evidence.rows)
+
+        def does_better(others: Score) -> bool:
+            if self.unlisted is not None:
+                return lead(others, mine) <= CHANCE
+            least = MOSTLY * float(mine.excess.sum())
+            return gain(mine, others) >= least and lead(mine, others) > SIGNIFICANCE
+
+        instead = len(first.found) + len(self.laws) + 1
+        barred = [there[0].place]
+        again = search(evidence, progress, panel, barred=barred, most=instead, worth=does_better)
+        law, outcome = find_law(evidence, again, progress) if again.found else (None, again)
         other = replace(self, outcome=outcome, unlisted=None, further=())
-        mine, others = self.score(evidence.rows), other.score(evidence.rows)
-        if self.unlisted is not None:
-            return other if lead(others, mine) <= CHANCE else self
-        least = MOSTLY * float(mine.excess.sum())
-        return other if gain(mine, others) >= least and lead(mine, others) > SIGNIFICANCE else self
+        return other if law is None and does_better(other.score(evidence.rows)) else self
 
     def remaining(self) -> Array:
         """(N, n) residual of the model with effects and law, N·m (N); the law is tried beyond its range, too."""

@@ -6,7 +6,7 @@ gains nothing; before the run every hypothesis is as likely as any other, and th
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, combinations
 
@@ -52,14 +52,18 @@ def search(
     progress: Progress,
     panel: Hypotheses | None = None,
     barred: Collection[Place] = (),
+    most: int = MOST_EFFECTS,
+    worth: Callable[[Score], bool] | None = None,
 ) -> Outcome:
     """The set of effects with the largest posterior that adding, dropping and exchanging reaches from none.
 
     Args:
         panel: who tries the hypotheses; in this process by default.
         barred: effects that are not asked about.
+        most: kinds of effects that are looked for, at most.
+        worth: whether a set that leaves so much is worth stating; if the likeliest is not, nothing is found.
     """
-    searching = _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1), barred)
+    searching = _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1), barred, most, worth)
     return searching.of_one_cause(searching.outcome())
 
 
@@ -83,9 +87,16 @@ class _Search:
     """One search: what could be explained at first, and what was tried beside the same effects before."""
 
     def __init__(
-        self, evidence: Evidence, progress: Progress, panel: Hypotheses, barred: Collection[Place]
+        self,
+        evidence: Evidence,
+        progress: Progress,
+        panel: Hypotheses,
+        barred: Collection[Place],
+        most: int = MOST_EFFECTS,
+        worth: Callable[[Score], bool] | None = None,
     ) -> None:
         self.evidence, self.progress, self.panel, self.barred = evidence, progress, panel, barred
+        self.most, self.worth = min(most, MOST_EFFECTS), worth
         self.nothing = Known.of(evidence)
         self.explainable: Array = np.maximum(self.nothing.fit.score.excess, 1e-9)
         self._beside: dict[tuple[tuple[Place, Shape], ...], tuple[Score, list[Tried]]] = {}
@@ -103,6 +114,9 @@ class _Search:
                 break
             found, value = others, best
             self.progress(f"likeliest: {', '.join(f.effect.label() for f in found) or 'nothing'}")
+        if self.worth is not None and not self.worth(self._known(found).fit.score):
+            # what is dropped from a set leaves no less than it
+            return Outcome([], self.nothing.fit, self.nothing.fit)
         outcome = self._settled(found)
         stays = [f.effect for f in outcome.found]
         unclear = [f.effect for f in found if f.effect not in stays]
@@ -168,7 +182,7 @@ class _Search:
     def _pairs(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """The same with two effects more, where much is left: what either leaves may be as large as what it removes."""
         if (
-            len(_kinds(found)) + 2 > MOST_EFFECTS
+            len(_kinds(found)) + 2 > self.most
             or not much_lasts(self.evidence, self._known(found).fit).any()
         ):
             return
@@ -208,7 +222,7 @@ class _Search:
     def _additions(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """Sets with one effect more, with their log posteriors."""
         there = [f.effect for f in found]
-        for trial in self._asked(found)[1] if len(_kinds(found)) < MOST_EFFECTS else []:
+        for trial in self._asked(found)[1] if len(_kinds(found)) < self.most else []:
             value = log_posterior(self.evidence, trial.score, [*there, trial.effect])
             yield value, [*found, Found(trial.effect, trial.shape, 0.0)]
 
