@@ -13,9 +13,11 @@ from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.model.components import RigidBody
 from armloop.reports.plots.loops import bode_figure
 from armloop.reports.tuning_tables import gains_table, margins_table, missed_notes, verified_table
+from armloop.robot.kinematics import nominal_parameters
 from armloop.util.errors import InputWarning
 from armloop.util.progress import silent
 from armloop.workflows import tune_scenario
+from armloop.workflows.other_inertia import other_inertia
 
 
 def test_files_tables_and_a_better_loop(tmp_path):
@@ -89,3 +91,38 @@ def test_a_model_of_another_inertia_than_the_simulated_arms_is_said(factor, said
         tune_scenario(scenario, 30.0, 60.0, model, None, silent)
     told = [str(w.message) for w in caught if "for the model's inertia" in str(w.message)]
     assert bool(told) == said and (not said or "at joint 3" in told[0])
+
+
+class TestInertiaOfAnother:
+    """A model of the three-axis arm with rotors, beside a plant whose URDF states none."""
+
+    ROTORS = (0.4, 0.3, 0.2)
+
+    def told(
+        self, *rotors: float, effects: tuple[UndeclaredEffect, ...] = (), links: float | None = None
+    ) -> str:
+        plant = load_tracking("three_axis_tracking").plant
+        config = dataclasses.replace(plant.config, rotor_inertia=self.ROTORS)
+        model = exact_model(plant.arm, config.friction, config.with_rotors())
+        if links is not None:
+            nothing = np.zeros(0)
+            body = RigidBody(links * nominal_parameters(plant.arm), (), nothing)
+            model = dataclasses.replace(model, components=(body,), effects=())
+        own = dataclasses.replace(plant, config=dataclasses.replace(plant.config, rotor_inertia=rotors))
+        return other_inertia(model, own, [0.0, 0.5, -0.5], effects)
+
+    def test_rotors_that_a_urdf_does_not_state_are_said_with_what_to_state(self) -> None:
+        assert "rotor_inertia: [0.4, 0.3, 0.2]" in self.told()
+        assert self.told(*self.ROTORS) == ""
+        # what is stated already is a part of it
+        assert "rotor_inertia: [0.4, 0.3, 0.2]" in self.told(0.01, 0.0, 0.0)
+        assert "rotor_inertia: [0.4, 0.3, 0.2]" in self.told(3.0, 3.0, 3.0)
+        # no rotor makes an arm lighter than its links
+        assert "where the model has" in (words := self.told(links=0.1)) and "rotor_inertia" not in words
+
+    def test_an_effect_that_nobody_declared_is_no_other_arm(self) -> None:
+        more = tuple(
+            UndeclaredEffect("rotor_inertia", j, {"inertia": x}) for j, x in enumerate(self.ROTORS, 1)
+        )
+        # stated as effects in the place of the field, or as what has changed about the arm
+        assert self.told(effects=more) == "" and self.told(*self.ROTORS, effects=more) == ""

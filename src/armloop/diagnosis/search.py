@@ -181,10 +181,7 @@ class _Search:
 
     def _pairs(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """The same with two effects more, where much is left: what either leaves may be as large as what it removes."""
-        if (
-            len(_kinds(found)) + 2 > self.most
-            or not much_lasts(self.evidence, self._known(found).fit).any()
-        ):
+        if len(_kinds(found)) + 2 > self.most or not much_lasts(self.evidence, self._known(found).fit).any():
             return
         more = sorted(self._additions(found), key=lambda step: -step[0])
         for _, first in more[:_FIRST]:

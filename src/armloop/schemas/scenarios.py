@@ -46,6 +46,9 @@ class PlantData(Struct, forbid_unknown_fields=True):
     friction: Annotated[
         list[FrictionData], Meta(max_length=MOST_JOINTS)
     ] = []  # one per joint, base to tip; of a usual size when empty
+    rotor_inertia: Annotated[
+        list[NotNegative], Meta(max_length=MOST_JOINTS)
+    ] = []  # of each drive, kg*m^2 (kg) at its joint
     ranges: RangesData | None = None  # from the limits when absent
     time_step: Annotated[float, Meta(ge=1e-4, le=5e-3)] = 0.001  # s, of the plant and of the controllers
     encoder_counts: Annotated[int, Meta(ge=0, le=1 << 40)] = 524288  # per revolution; 0 for ideal encoders

@@ -27,14 +27,17 @@ from armloop.drake.plant.fault_injection import realise
 from armloop.drake.tuning.loop_analysis import sampled_margins
 from armloop.drake.tuning.tuned_loop import along_reference
 from armloop.drake.view.live import LiveView
+from armloop.dynamics import with_mass_matrix
 from armloop.identification.goodness import extrapolated
 from armloop.identification.reconstruction import reconstruct
 from armloop.model import ReconstructedModel
 from armloop.robot.levelling import say_other_stance
 from armloop.util.doubts import warn
+from armloop.util.errors import ModelError
 from armloop.util.files import write_figure, write_json
 from armloop.util.finite import finite
 from armloop.util.progress import Progress
+from armloop.workflows.other_inertia import other_inertia
 
 SCHEMA = "armloop/tracking/1"
 
@@ -101,6 +104,28 @@ def _say_doubts(scenario: TrackingScenario, models: Mapping[str, ReconstructedMo
         say_other_stance(scenario.plant.arm, gravity, model.arm, f"{scenario.name}, model {name}")
         for words in extrapolated(scenario.plant.arm, motion, model.history.get("range")):
             warn(f"{scenario.name}, model {name}: {words}; what it feeds forward there is extrapolated")
+    # of one model under several names it is said once
+    for words in dict.fromkeys(
+        _other_inertia(scenario, model) for name, model in models.items() if _moves(name)
+    ):
+        if words:
+            warn(
+                f"{scenario.name}: {words}; as it is, what a model feeds forward for the acceleration does not suit the arm"
+            )
+
+
+def _moves(name: str) -> bool:
+    """Whether a model of this name is used with its acceleration terms."""
+    return name not in ("step1", "step2", "pid_step1", "pid_step2")
+
+
+def _other_inertia(scenario: TrackingScenario, model: ReconstructedModel) -> str:
+    """Whose inertia a model has, if not the simulated arm's; empty where it has none that can be compared."""
+    try:
+        known = with_mass_matrix(model)
+    except ModelError:
+        return ""
+    return other_inertia(known, scenario.plant, scenario.reference.evaluate([0.0])[0][0], scenario.effects)
 
 
 def log_file(controller: str) -> str:

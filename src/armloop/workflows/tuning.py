@@ -14,15 +14,13 @@ from armloop.drake.tuning.loop_analysis import model_posture, posture_model
 from armloop.drake.tuning.tuned_loop import TunedLoop, Tuning, look_at
 from armloop.dynamics import with_mass_matrix
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
 from armloop.util.doubts import warn
 from armloop.util.files import write_figure, write_json, write_text
 from armloop.util.finite import finite
 from armloop.util.progress import Progress
+from armloop.workflows.other_inertia import other_inertia
 
 SCHEMA = "armloop/tune/1"
-#: A joint's inertia in the model is another than that of the simulated arm from this factor on.
-_OTHER = 1.5
 
 
 def tune_scenario(
@@ -47,10 +45,14 @@ def tune_scenario(
         ModelError: the model has no mass matrix.
     """
     plant, q0 = scenario.plant, scenario.reference.evaluate([0.0])[0][0]
-    known = simulated = posture_model(plant.arm, plant.config.friction, q0)
+    known = posture_model(plant.arm, plant.config.friction, q0, plant.config.with_rotors())
     if model is not None:
-        known = model_posture(with_mass_matrix(model), q0)
-        _say_other_inertia(np.diag(known[0]), np.diag(simulated[0]))
+        given = with_mass_matrix(model)
+        known = model_posture(given, q0)
+        if other := other_inertia(given, plant, q0):
+            warn(
+                f"the proposed gains are for the model's inertia, margins and errors of the simulated arm: {other}"
+            )
     if scenario.effects:
         named = ", ".join(effect.build().label() for effect in scenario.effects)
         warn(f"{scenario.name}: gains are tuned for the arm without the scenario's effects ({named})")
@@ -69,19 +71,6 @@ def tune_scenario(
         for name, draw in (("bode.png", bode_figure), ("step.png", step_figure)):
             write_figure(folder / name, draw(tuning))
     return answer, tuning
-
-
-def _say_other_inertia(model: Array, simulated: Array) -> None:
-    """Warn of joints whose inertia (n,) in the model is another than that of the arm on which the gains are tried."""
-    other = np.flatnonzero(np.abs(np.log(model / simulated)) > np.log(_OTHER)).tolist()
-    if other:
-        said = ", ".join(
-            f"{simulated[j]:.3g} where the model has {model[j]:.3g} at joint {j + 1}" for j in other
-        )
-        warn(
-            "the proposed gains are for the model's inertia; margins and errors are of the simulated arm, whose own is "
-            f"another (a URDF states no rotors; kg*m^2, kg): {said}"
-        )
 
 
 def tuning_answer(tuning: Tuning) -> dict[str, Any]:

@@ -68,7 +68,8 @@ def _depends(scenario: TrackingScenario, models: Mapping[str, ReconstructedModel
                 scenario.effects,
             )
         ),
-        repr((plant.config.friction, plant.config.instruments, plant.config.time_step)),
+        repr(plant.config.friction),
+        repr((plant.config.rotor_inertia, plant.config.instruments, plant.config.time_step)),
         repr([(joint.kind, joint.effort) for joint in plant.arm.joints]),
         {key: value for key, value in plant.arm.to_dict().items() if key != "fingerprint"},
         digest(*motion, *gains, *([] if scenario.rate is None else [scenario.rate])),

@@ -42,6 +42,22 @@ def law(plant, q, v, vdot):
     return tau + np.stack([f.force(v[:, j]) for j, f in enumerate(plant.config.friction)], axis=1)
 
 
+def test_rotors_are_in_what_is_collected_and_measured():
+    plant = load_plant("three_axis")
+    rotors = np.array([1.0, 0.8, 0.6])
+    config = dataclasses.replace(plant.config, instruments=IDEAL, rotor_inertia=tuple(rotors))
+    run = measure_run(plant.arm, config, 1, duration=5.0)
+    varying = collect(plant.arm, config, TINY, seed=3)["varying"]
+    for log in (run, varying):
+        for rows in log.runs():
+            part = log.select(rows)
+            vdot = np.gradient(part.v, part.time, axis=0)
+            more = part.tau - law(plant, part.q, part.v, vdot)
+            slides = (np.abs(part.v) > 0.1).all(axis=1)
+            found = [np.polyfit(vdot[slides, j], more[slides, j], 1)[0] for j in range(3)]
+            assert_allclose(found, rotors, rtol=0.05)
+
+
 @pytest.mark.parametrize("name", ["three_axis", "scara"])
 def test_settled_segments_hold_the_law(name):
     plant, _, logs = tiny(name, instruments=IDEAL)

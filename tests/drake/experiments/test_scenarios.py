@@ -206,6 +206,11 @@ def test_a_reference_from_a_file(tmp_path):
         ),
         (OWN.replace("viscous", "viscosity"), r"friction\[1\]: field 'viscosity' is unknown"),
         (OWN + "  time_step: 0.5\n", "time_step is 0.5; it must be"),
+        (
+            OWN + "  rotor_inertia: [0.1, 0.2]\n",
+            "own_plant: rotor_inertia has 2 numbers; it must have one per",
+        ),
+        (OWN + "  rotor_inertia: [0.1, 0.2, -1]\n", r"own_plant.rotor_inertia\[3\] is -1"),
         (OWN + "  encoder_counts: -1\n", "encoder_counts is -1"),
         (
             OWN + "  ranges: {lower: [0], upper: [1], velocity: [1], acceleration: [1]}\n",

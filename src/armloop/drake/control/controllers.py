@@ -138,7 +138,8 @@ class Exact(Pid):
     name = "exact"
 
     def model(self, scenario: TrackingScenario, models: Models, effects: Effects) -> FeedforwardModel | None:
-        return exact_model(scenario.plant.arm, scenario.plant.config.friction, effects)
+        plant = scenario.plant
+        return exact_model(plant.arm, plant.config.friction, plant.config.with_rotors(effects))
 
 
 def _as_stiff(scenario: TrackingScenario, model: FeedforwardModel | None) -> AccelerationGains:

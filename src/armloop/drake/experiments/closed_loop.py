@@ -190,7 +190,7 @@ def add_arm_under(
             f"{name}: has a period of {law.period:g} s, the plant {period:g} s; give both the same"
         )
     source = ReferenceSource(reference, period, model if "tau_ff" in wanted else None, step)
-    body = ArmPlant(plant.arm, config.friction, effects=effects, time_step=period)
+    body = ArmPlant(plant.arm, config.friction, effects=config.with_rotors(effects), time_step=period)
     suffix = _suffix(builder, [body.get_name(), "reference", name, "drives"])
     builder.AddNamedSystem(body.get_name() + suffix, body)
     builder.AddNamedSystem(f"reference{suffix}", source)

@@ -62,7 +62,13 @@ def collect(
 
     @cache  # each process builds its own: diagrams cannot be sent to another
     def rig(time_step: float) -> SpeedModeArm:
-        return SpeedModeArm(arm, config.friction, instruments=config.instruments, time_step=time_step)
+        return SpeedModeArm(
+            arm,
+            config.friction,
+            effects=config.with_rotors(),
+            instruments=config.instruments,
+            time_step=time_step,
+        )
 
     def record(job: tuple[int, int]) -> Recording:
         part = parts[job[0]]
@@ -144,7 +150,7 @@ def measure_run(
     rig = SpeedModeArm(
         arm,
         config.friction,
-        effects=effects,
+        effects=config.with_rotors(effects),
         instruments=config.instruments,
         time_step=config.time_step,
         law=law,

@@ -297,4 +297,11 @@ def _plant(name: str, data: PlantData, where: str, loaded: Arm | None = None) ->
         except ValueError as error:
             raise ScenarioError(f"{where}: ranges: {error}") from error
     instruments = Instruments(data.encoder_counts, data.prismatic_lead, data.torque_noise)
-    return Plant(name, arm, PlantConfig(tuple(friction), ranges, instruments, data.time_step))
+    rotors = data.rotor_inertia and per_joint(
+        data.rotor_inertia, arm.n, f"{where}: rotor_inertia", spread=False
+    )
+    return Plant(
+        name,
+        arm,
+        PlantConfig(tuple(friction), ranges, instruments, data.time_step, tuple(map(float, rotors))),
+    )

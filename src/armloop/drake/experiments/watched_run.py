@@ -61,7 +61,7 @@ def run_watched(
     arm, config = scenario.plant.arm, scenario.plant.config
     n, step = arm.n, config.time_step
     builder = DiagramBuilder()
-    plant = builder.AddSystem(ArmPlant(arm, config.friction, time_step=step))
+    plant = builder.AddSystem(ArmPlant(arm, config.friction, effects=config.with_rotors(), time_step=step))
     source = builder.AddNamedSystem("reference", ReferenceSource(scenario.reference, step, model, 3))
     law = builder.AddNamedSystem(
         "pid", PidController(scenario.gains, step, config.instruments.resolution(arm))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.plant.friction import JointFriction
 from armloop.experiment.excitation import MotionRanges
 from armloop.robot.arm import Arm
@@ -49,12 +51,23 @@ class Instruments:
 
 @dataclass(frozen=True, eq=False)
 class PlantConfig:
-    """A simulated arm's friction, instruments and the ranges its data are collected in.
+    """A simulated arm's friction, rotors, instruments and the ranges its data are collected in.
 
     friction : one per joint; ranges : Tables 1 and 3; time_step : s
+    rotor_inertia : of each drive, seen at its joint, kg m² (kg); of none where it is empty: a URDF states none
     """
 
     friction: tuple[JointFriction, ...]
     ranges: MotionRanges
     instruments: Instruments = field(default_factory=Instruments)
     time_step: float = 1e-3
+    rotor_inertia: tuple[float, ...] = ()
+
+    def with_rotors(self, effects: Sequence[UndeclaredEffect] = ()) -> tuple[UndeclaredEffect, ...]:
+        """Return what the plant has beside its links: the drives' rotors, and effects."""
+        rotors = (
+            UndeclaredEffect("rotor_inertia", j, {"inertia": inertia})
+            for j, inertia in enumerate(self.rotor_inertia, 1)
+            if inertia
+        )
+        return (*rotors, *effects)

@@ -87,7 +87,8 @@ def along_reference(scenario: TrackingScenario, effects: Effects) -> dict[float,
     times = np.linspace(0, scenario.reference.duration, _POSTURES + 1)[:-1]
     return {
         float(t): SampledArm.of(
-            posture_model(plant.arm, plant.config.friction, q, effects), plant.config.time_step
+            posture_model(plant.arm, plant.config.friction, q, plant.config.with_rotors(effects)),
+            plant.config.time_step,
         )
         for t, q in zip(times, scenario.reference.evaluate(times)[0], strict=True)
     }
@@ -99,7 +100,8 @@ def look_at(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:
     plant, period = scenario.plant, scenario.plant.config.time_step
     unit = np.where(plant.arm.revolute, np.deg2rad(STEP), 1e-3 * STEP)
     shown = np.where(plant.arm.revolute, np.rad2deg(1.0), 1e3)
-    sampled = SampledArm.of(posture_model(plant.arm, plant.config.friction, q0), period)
+    linear = posture_model(plant.arm, plant.config.friction, q0, plant.config.with_rotors())
+    sampled = SampledArm.of(linear, period)
     margins = sampled_margins(sampled, gains)
     w = np.geomspace(0.1, np.pi / period, 600)
     L = sampled.loops(gains, w)
