@@ -1,4 +1,4 @@
-"""What may be a counterweight, or a balancer that has lost force, is said beside what is stated."""
+"""What may be a counterweight, a balancer that has lost force, or a gear's efficiency, is said beside what is stated."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from armloop.diagnosis.reasons import of_a_balancer, of_a_constant_pull
+from armloop.diagnosis.reasons import of_a_balancer, of_a_constant_pull, of_an_efficiency
 from armloop.laws.effects import Estimate, effect
 from armloop.model import AddedEffect
 from armloop.robot.arm import load_arm
@@ -56,3 +56,15 @@ def test_a_law_of_the_angle_beside_a_spring_with_levers_may_be_that_spring(
         words.startswith("joint 2 has a spring that pulls by levers: one that has lost force")
         for words in found
     ] == ([True] if told else [])
+
+
+@pytest.mark.parametrize(("joint", "told"), [(2, True), (3, False)])
+def test_a_gain_beside_friction_that_grows_with_the_load_may_be_a_gears_efficiency(
+    joint: int, told: bool
+) -> None:
+    rubs = AddedEffect(effect("load_dependent_friction", 2), {"coefficient": Estimate(0.0873, 0.0049, "1")})
+    gain = AddedEffect(effect("torque_gain", joint), {"gain": Estimate(1.0449, 0.0028, "1")})
+    found = of_an_efficiency([rubs, gain])
+    assert bool(found) == told and of_an_efficiency([gain]) == []
+    # of a load L it drives with (mu + g - 1) L more than L, and is driven by it with as much less
+    assert not told or "loses 0.132 of the load while it drives it and 0.0424 while the load" in found[0]

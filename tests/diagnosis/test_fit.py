@@ -155,3 +155,19 @@ def test_what_a_run_shows_alone_counts_no_error_of_the_model() -> None:
     assert found.clear[0] == pytest.approx(3.0 / np.sqrt(spread), rel=1e-6)
     assert found.shown[0] == pytest.approx(3.0 / np.sqrt(spread - 1.5**2), rel=1e-6)
     assert found.clear[0] < 2.0 < 3.0 < found.shown[0]
+
+
+def test_effects_whose_columns_are_nearly_alike_may_be_plain_together_alone() -> None:
+    """Two columns that differ in a hundredth of their size, of which the sum is 3."""
+    rng = np.random.default_rng(0)
+    base, off = np.ones((40, 1)), 0.01 * rng.normal(size=(40, 1))
+    X, blocks = np.hstack([base, base + off, rng.normal(size=(40, 1))]), np.arange(40)
+    y = 3.0 + rng.normal(size=40)
+    rows = fit.Stacked(X, y, blocks, blocks % 2, np.zeros(40, dtype=int), 1, blocks, np.zeros((40, 0)))
+    beta = np.linalg.lstsq(X, y)[0]
+    solution = fit.Solution(beta, list(beta[:, None]), np.eye(3), [0.0] * 3)
+    own: Any = effect("viscous_friction", 1)
+    found = fit.Fit(None, (own,) * 3, (), solution, np.zeros((2, 40)), rows)  # type: ignore[arg-type]
+    assert max(found.clear[:2]) < 2.0
+    assert found.clear_together([0, 1]) > 10.0
+    assert found.clear_together([2]) == pytest.approx(found.clear[2])

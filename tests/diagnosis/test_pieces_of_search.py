@@ -93,6 +93,8 @@ class TestSearch:
                 shown=shown,
                 wald=[(0.0, 1)] * len(names),
                 added=lambda: added,
+                effects=(),
+                parameters=(),
             )
             return SimpleNamespace(names=names, fit=fit)
 
@@ -347,3 +349,39 @@ class TestSearch:
             monkeypatch.setattr(searching, "clear", clear)
             monkeypatch.setattr(searching, "pruned", pruned)
             assert self.found(search) == named
+
+
+@pytest.mark.parametrize(
+    ("joints", "with_them", "without", "plain", "possible", "needed"),
+    [
+        ((3, 3), 200.0, 3000.0, 4.0, True, True),
+        ((3, 2), 200.0, 3000.0, 4.0, True, False),  # not of one joint: two effects, none of them plain
+        ((3,), 200.0, 3000.0, 4.0, True, False),  # of one alone the model's own errors may be as large
+        ((3, 3), 200.0, 350.0, 4.0, True, False),  # what is left without them is no multiple of the baseline
+        ((3, 3), 1200.0, 3000.0, 4.0, True, False),  # most of it is left with them, too
+        ((3, 3), 200.0, 3000.0, 2.9, True, False),
+        ((3, 3), 200.0, 3000.0, 4.0, False, False),
+    ],
+)
+def test_what_is_plain_together_alone_is_stated_together(
+    joints: tuple[int, ...], with_them: float, without: float, plain: float, possible: bool, needed: bool
+) -> None:
+    """Friction that grows with the load beside a gain, on a run in which one is nearly the other; a hundred rows."""
+    effects: list[Any] = [
+        SimpleNamespace(place=(k, joint), joint=joint, possible=lambda *given: possible)
+        for k, joint in enumerate(joints)
+    ]
+    other: Any = SimpleNamespace(place=("there", 1), joint=1, possible=lambda *given: True)
+    asked: list[Any] = []
+    fitted = SimpleNamespace(
+        effects=[other, *effects],
+        parameters=[{}] * (1 + len(effects)),
+        score=score(with_them, blocks=20),
+        arm=None,
+        had=(),
+        clear_together=lambda those: asked.append(those) or plain,
+    )
+    together: Any = SimpleNamespace(after=fitted)
+    others: Any = SimpleNamespace(after=SimpleNamespace(score=score(without, blocks=20)))
+    assert searching._are_needed(effects, together, others) == needed
+    assert not asked or asked == [[1, 2]]

@@ -326,7 +326,13 @@ class TestReasons:
     ) -> None:
         words, unknown = self.standing(monkeypatch, [1.9, None, None], poor=0.5)
         assert len(words) == 1 and "leaves 50% of the torque on its own training logs" in words[0] and unknown
-        assert self.standing(monkeypatch, [1.9, None, None], poor=0.49) == (["1 3.8"], False)
+        words, unknown = self.standing(monkeypatch, [1.9, None, None], poor=0.49)
+        assert (words[0], unknown) == ("1 3.8", False) and len(words) == 2
+        # judged, but not what is smaller
+        assert words[1].startswith(
+            "on its own training logs the model leaves 49% of joint 1's torque: what changes by"
+        )
+        assert self.standing(monkeypatch, [1.9, None, None], poor=0.19) == (["1 3.8"], False)
         # one that knows what it leaves says that
         own = {"joint": 1, "explained": 0.5, "predictable_left": 0.4, "std_error": 0.1, "noise": 0.1}
         model: Any = SimpleNamespace(baseline={"nrmse": [0.7, 0.7], "joints": [own]})

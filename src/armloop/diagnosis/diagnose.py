@@ -39,6 +39,7 @@ from armloop.diagnosis.reasons import (
     masked,
     of_a_balancer,
     of_a_constant_pull,
+    of_an_efficiency,
     of_too_few_logs,
     standing,
     too_little,
@@ -277,5 +278,6 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
         ]
     doubted += [*of_the_temperature(model, outcome.added()), *of_too_few_logs(model, outcome.found)]
     doubted += [*of_a_constant_pull(model, outcome.added()), *of_a_balancer(model, laws)]
+    doubted += of_an_efficiency(outcome.added())
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))

@@ -141,12 +141,29 @@ class Fit:
         """Covariance of each effect's free parameters."""
         return self._spread_of(self.stacked)
 
+    def clear_together(self, those: Sequence[int]) -> float:
+        """How many standard errors all coefficients of some effects together are from zero (joint Wald test).
+
+        Of effects whose columns are nearly alike none need be clear by itself.
+        """
+        blocks = self._blocks()
+        own = np.concatenate([np.arange(blocks[k].start, blocks[k].stop) for k in those])
+        whole = self._whole(self.stacked)
+        return deviate(*wald_statistic(np.concatenate(self.solution.free)[own], whole[np.ix_(own, own)]))
+
     def _spread_of(self, rows: Stacked) -> list[Array]:
-        beta, free, J, _ = self.solution
-        whole = covariance(rows.X @ J, rows.y - rows.X @ beta, rows)
-        ends = np.cumsum([len(own) for own in free])
-        blocks = (slice(end - len(own), end) for own, end in zip(free, ends, strict=True))
-        return [whole[block, block] for block in blocks]
+        whole = self._whole(rows)
+        return [whole[block, block] for block in self._blocks()]
+
+    def _whole(self, rows: Stacked) -> Array:
+        """Covariance of the free parameters of all effects."""
+        beta, _, J, _ = self.solution
+        return covariance(rows.X @ J, rows.y - rows.X @ beta, rows)
+
+    def _blocks(self) -> list[slice]:
+        """Where each effect's are among them."""
+        sizes = [len(own) for own in self.solution.free]
+        return [slice(end - own, end) for own, end in zip(sizes, np.cumsum(sizes).tolist(), strict=True)]
 
     @cached_property
     def held_out(self) -> Array:

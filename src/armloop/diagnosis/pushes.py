@@ -374,7 +374,8 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
         return burst
     _, columns, y = _burst(evidence, residual, weight, middle, kind)
     size = event_size(columns, y)
-    near = _near(evidence, burst, (weight[:, columns.any(axis=(0, 2))] > 0).any(axis=1))
+    tells = np.asarray((weight[:, columns.any(axis=(0, 2))] > 0).any(axis=1))
+    near = _near(evidence, burst, tells)
     _, columns, y = _burst(evidence, residual, weight, near, kind)
     # Half of it explains a sample as well as nothing or all does: what comes and goes smoothly counts from there.
     removed = (y**2 - (y - columns @ size) ** 2).sum(axis=1)

@@ -33,9 +33,12 @@ from armloop.identification.scoring import too_slow
 from armloop.identification.shared_motors import sharing
 from armloop.identification.uncertainty import usual_in_words
 from armloop.laws.effects import Effect
+from armloop.laws.effects.base import number
 from armloop.laws.effects.events import ends
 from armloop.laws.effects.found import RANGE
+from armloop.laws.effects.load_dependent_friction import LoadDependentFriction
 from armloop.laws.effects.spring_balancer import SpringBalancer
+from armloop.laws.effects.torque_gain import TorqueGain
 from armloop.laws.effects.torque_offset import TorqueOffset
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Mask
@@ -50,6 +53,8 @@ class _Law(Protocol):
 
 #: Fewest moving samples of a joint that has moved.
 _FEWEST = 20
+#: A model that leaves so much of a joint's torque hides changes that a user would want to see.
+_ROUGH = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +100,7 @@ def standing(
     slides = sliding(samples, model)
     few = seldom(model, samples, slides & ~strays & ~creeps)
     reasons = [*_outside(outside, far), *_slow(model, slow)]
-    unknown, unexplained, judged = False, [], 0
+    unknown, unexplained, judged, rough = False, [], 0, []
     multiples: list[bool | None] = []
     for j, part in enumerate(parts):
         unknown |= bool(far[j] > NEARLY_ALL)
@@ -111,6 +116,8 @@ def standing(
         of = after[j]
         ratio = np.nan if of is None else of / float(evidence.scale[j])
         judged += 1
+        if not poor and _left_in_training(model, j) >= _ROUGH:
+            rough.append(j)
         if poor or not ratio > 1:
             continue
         words, real = _multiple(part, j, ratio, found)
@@ -122,6 +129,7 @@ def standing(
             unexplained += [j] if real or much else []
             # noise that is a multiple of what is said to be much may be anything, and hides what is smaller
             unknown |= much or ratio >= MULTIPLE**2
+    reasons += _rough(model, rough)
     # noise, or what happened once, such as a hard stop that all joints feel, makes no other record
     if len(multiples) > max(MOSTLY * judged, 1) and any(real is not False for real in multiples):
         reasons.insert(0, _all_over(model, len(multiples), judged))
@@ -254,6 +262,23 @@ def of_a_constant_pull(model: ReconstructedModel, added: Sequence[AddedEffect]) 
     ]
 
 
+def of_an_efficiency(added: Sequence[AddedEffect]) -> list[str]:
+    """A sentence on each gain of a torque reading beside friction that grows with the load: it may be one cause."""
+    rubs = {a.effect.joint: a for a in added if isinstance(a.effect, LoadDependentFriction)}
+    found = []
+    for a in added:
+        if isinstance(a.effect, TorqueGain) and a.effect.joint in rubs:
+            mu = number(rubs[a.effect.joint].parameters["coefficient"].value)
+            more = number(a.parameters["gain"].value) - 1
+            found.append(
+                f"joint {a.effect.joint}: a gear that loses {mu + more:.3g} of the load while it drives it and "
+                f"{mu - more:.3g} while the load drives it leaves the same record as friction that grows with the load and "
+                "a sensor's gain beside it: one cause, of the arm, for which a controller must supply both parts; a known "
+                "weight held at rest tells the gain of a sensor"
+            )
+    return found
+
+
 def of_a_balancer(model: ReconstructedModel, laws: Sequence[_Law]) -> list[str]:
     """A sentence on each law of its own angle alone at a joint that a spring with levers pulls at: it may be the spring."""
     sprung = {a.effect.joint for a in model.effects if isinstance(a.effect, SpringBalancer)}
@@ -355,8 +380,7 @@ def _slow(model: ReconstructedModel, slow: Array) -> list[str]:
 
 def _too_poor(model: ReconstructedModel, j: int) -> str:
     """A sentence on a model that leaves most of a joint's torque, RMS: it judges nothing there; else empty."""
-    own = model.baseline.get("nrmse") or []
-    share = own[j] if j < len(own) and own[j] is not None else 0.0
+    share = _left_in_training(model, j)
     if share < MOSTLY:
         return ""
     joints = model.baseline.get("joints") or []
@@ -364,6 +388,22 @@ def _too_poor(model: ReconstructedModel, j: int) -> str:
     if said.much_is_left:
         return said.sentence()
     return f"joint {j + 1}: the model leaves {share:.0%} of the torque on its own training logs: it judges nothing there"
+
+
+def _left_in_training(model: ReconstructedModel, j: int) -> float:
+    """RMS of what a model leaves of a joint on its own training logs, as a part of that of the torque; 0 if nobody knows."""
+    own = model.baseline.get("nrmse") or []
+    return float(own[j]) if j < len(own) and own[j] is not None else 0.0
+
+
+def _rough(model: ReconstructedModel, joints: Sequence[int]) -> list[str]:
+    """A sentence on joints (0-based) of which the model leaves much, if not most, of the torque: it hides what is smaller."""
+    if not joints:
+        return []
+    shares = ", ".join(f"{_left_in_training(model, j):.0%} of joint {j + 1}'s torque" for j in joints)
+    return [
+        f"on its own training logs the model leaves {shares}: what changes by less than that hardly shows there"
+    ]
 
 
 def _multiple(part: Parts, j: int, ratio: float, found: bool = False) -> tuple[str, bool | None]:
@@ -375,9 +415,13 @@ def _multiple(part: Parts, j: int, ratio: float, found: bool = False) -> tuple[s
     size = f"joint {j + 1}: {'what is left' if found else 'the residual'} is {ratio:.1f} times the baseline"
     left, error, noise = part.predictable_left, part.std_error, part.noise
     if left is None or error is None or noise is None:
+        weak = ratio < MULTIPLE**2
         return (
             f"{size}: something is there, too weak or too short on this run to be named; the motion of --next-run would "
-            "show it",
+            "show it"
+            if weak
+            else f"{size}: something is there that no listed effect nor a law that is stated accounts for, as play in a "
+            "gear may be; the motion of --next-run may tell more",
             True,
         )
     much = (1 - NEARLY_ALL) * (left + noise)

@@ -14,11 +14,7 @@ import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
-from armloop.diagnosis.judgement import (
-    MOST,
-    gain,
-    log_likelihood,
-)
+from armloop.diagnosis.judgement import MOST, SIGNIFICANCE, gain, lead, log_likelihood, much_is_left
 from armloop.diagnosis.lasting import much_lasts
 from armloop.diagnosis.masking import masked, stand_in
 from armloop.diagnosis.one_way import one_way
@@ -138,7 +134,8 @@ class _Search:
         for likely, more in sorted(steps, key=lambda step: -step[0]):
             if likely > value + _LEAST and len((again := self._settled(more)).found) == len(more):
                 return replace(again, masked=outcome.masked)
-        return outcome
+        together = self._stated_together(found)
+        return together if _are_needed(unclear, together, outcome) else outcome
 
     def of_one_cause(self, outcome: Outcome) -> Outcome:
         """The same with one cause in the place of two that agree, where it is stated as they are."""
@@ -166,9 +163,13 @@ class _Search:
 
     def _settled(self, found: list[Found]) -> Outcome:
         """A set of effects without what is not worth it or not clear of its error."""
+        return clear(self.evidence, self._stated_together(found))
+
+    def _stated_together(self, found: list[Found]) -> Outcome:
+        """A set of effects without what is not worth it."""
         after = self._known(found).fit
         found = [self._stated(found, k, after.score) for k in range(len(found))]
-        return clear(self.evidence, pruned(self.evidence, Outcome(found, self.nothing.fit, after)))
+        return pruned(self.evidence, Outcome(found, self.nothing.fit, after))
 
     def _steps(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """Sets with one effect more, one less, or another in the place of one."""
@@ -261,3 +262,29 @@ class _Search:
 
 def _kinds(found: Sequence[Found]) -> set[str]:
     return {f.effect.name for f in found}
+
+
+def _are_needed(unclear: Sequence[Effect], together: Outcome, others: Outcome) -> bool:
+    """Whether effects of one joint, none of them clear of its error, are plain together, and the rest is far from it.
+
+    Of columns nearly alike a run may tell the sum, on blocks that were not fitted, and no part of it.
+
+    Args:
+        together: with those effects.
+        others: what was found without them.
+    """
+    fitted, left = together.after, others.after.score
+    places = {effect.place for effect in unclear}
+    those = [k for k, effect in enumerate(fitted.effects) if effect.place in places]
+    if len(those) < 2 or len({effect.joint for effect in unclear}) > 1 or not much_is_left(left).any():
+        return False
+    most = MOST * float(np.maximum(left.excess, 0.0).sum())
+    return (
+        gain(left, fitted.score) >= most
+        and lead(left, fitted.score) > SIGNIFICANCE
+        and fitted.clear_together(those) >= SIGNIFICANCE
+        and all(
+            effect.possible(fitted.arm, own, fitted.had)
+            for effect, own in zip(fitted.effects, fitted.parameters, strict=True)
+        )
+    )

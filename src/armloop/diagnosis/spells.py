@@ -104,9 +104,7 @@ def _is_asked(account: Account) -> bool:
 
 def _given(whole: Evidence, best: _Candidate, logs: Sequence[MotionLog]) -> Found:
     """The friction as an effect that was found; its share is not known yet."""
-    named = best.intervals
-    if len(logs) > 1:
-        named = tuple(replace(own, log=log_name(logs, own.start, own.posture)) for own in named)
+    named = tuple(replace(own, log=log_name(logs, own.start, own.posture)) for own in best.intervals)
     edge = max(whole.samples.period, whole.samples.reach, *(own.gap / 2 for own in best.intervals))
     return Found(best.effect.within(Spells(named, edge)), Shape.fixed(best.shape), 0.0)
 

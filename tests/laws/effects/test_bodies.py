@@ -212,7 +212,7 @@ def test_gravity_shows_the_moment_about_any_other_first_axis(turned, context):
 
 def test_the_words_say_in_which_frame_the_centre_is():
     body = {"mass": Estimate(0.5, 0.01, "kg"), "com": Estimate([0.1, 0.0, 0.2], [0.01] * 3, "m")}
-    frame = "centre at (0.100, 0.000, 0.200) m in the frame of the link tool (of the last moving link if "
+    frame = "(0.100 ± 0.010, 0.000 ± 0.010, 0.200 ± 0.010) m in the frame of the link tool (of the last moving link if "
     assert frame in effect("payload", None).sentence(body)
     carried = {**body, "picked_up": Estimate([1.0], [0.0], "s"), "put_down": Estimate([2.0], [0.0], "s")}
     words = effect("carried_load", None).sentence(carried)

@@ -298,7 +298,7 @@ def test_what_a_motion_does_not_determine_has_no_standard_error(context):
     straight = replace(context.arm, X_tool=np.eye(4))
     found = build("payload").estimates(straight, x, covariance, 0.0)
     np.testing.assert_allclose(found["com"].std_error, [np.hypot(5e-3, 5e-4), np.hypot(5e-3, 1e-3), np.nan])
-    assert "(0.050, 0.100, not determined)" in build("payload").sentence(found)
+    assert "(0.0500 ± 0.0050, 0.1000 ± 0.0051, not determined)" in build("payload").sentence(found)
     spring = build("joint_spring").estimates(context.arm, np.array([2.0, 0.8]), np.diag([0.01, np.inf]), 0.0)
     assert spring["stiffness"].std_error == pytest.approx(0.1) and np.isnan(spring["rest"].std_error)
 

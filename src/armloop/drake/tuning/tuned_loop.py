@@ -100,8 +100,8 @@ def look_at(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:
     plant, period = scenario.plant, scenario.plant.config.time_step
     unit = np.where(plant.arm.revolute, np.deg2rad(STEP), 1e-3 * STEP)
     shown = np.where(plant.arm.revolute, np.rad2deg(1.0), 1e3)
-    linear = posture_model(plant.arm, plant.config.friction, q0, plant.config.with_rotors())
-    sampled = SampledArm.of(linear, period)
+    at_rest = posture_model(plant.arm, plant.config.friction, q0, plant.config.with_rotors())
+    sampled = SampledArm.of(at_rest, period)
     margins = sampled_margins(sampled, gains)
     w = np.geomspace(0.1, np.pi / period, 600)
     L = sampled.loops(gains, w)

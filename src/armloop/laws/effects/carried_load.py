@@ -9,7 +9,7 @@ import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.laws.effects.base import Array, Context, Estimate, Value, Values
-from armloop.laws.effects.payload import Payload, on_the_last_link
+from armloop.laws.effects.payload import Payload
 from armloop.laws.effects.spells import Interval, during_any
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Mask
@@ -71,10 +71,8 @@ class CarriedLoad(Payload):
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         first, last = (np.atleast_1d(np.asarray(parameters[key].value)) for key in ("picked_up", "put_down"))
-        mass, com = parameters["mass"], np.asarray(parameters["com"].value)
-        at = ", ".join(f"{x:.3f}" for x in com)
         when = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in zip(first, last, strict=True))
-        return f"{on_the_last_link(mass, at)}, carried from {when} s"
+        return f"{super().sentence(parameters)}, carried from {when} s"
 
 
 def _intervals(parameters: Values, n: int) -> list[Interval]:

@@ -62,7 +62,7 @@ class ExternalContact(Effect):
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         start, end, force = (parameters[key] for key in ("start", "end", "force"))
-        size = float(np.linalg.norm(np.asarray(force.value)))
+        size = _size(force).words(3)
         at = ", ".join(f"{x:.1f}" for x in np.asarray(force.value))
         where = (
             f"link {number(parameters['link'].value):.0f} at its far end"
@@ -73,6 +73,14 @@ class ExternalContact(Effect):
             point = ", ".join(f"{x:.2f}" for x in np.asarray(parameters["point"].value))
             where = f"what the last link holds, at ({point}) m in its frame,"
         return (
-            f"something pushed {where} with {size:.3g} N on average, ({at}) N in the base frame, from "
+            f"something pushed {where} with {size} on average, ({at}) N in the base frame, from "
             f"{number(start.value):.2f} to {number(end.value):.2f} s"
         )
+
+
+def _size(force: Estimate) -> Estimate:
+    """A force's size, and its standard error along the force (linear error propagation)."""
+    components, errors = np.asarray(force.value, dtype=float), np.broadcast_to(force.std_error, 3)
+    size = float(np.linalg.norm(components))
+    along = components / size if size else np.full(3, 3**-0.5)
+    return Estimate(size, float(np.linalg.norm(along * errors)), "N")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -118,11 +119,15 @@ class Payload(Effect):
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         mass, com = parameters["mass"], parameters["com"]
         known = np.isfinite(np.broadcast_to(com.std_error, 3))
-        at = ", ".join(
-            f"{x:.3f}" if one else "not determined"
-            for x, one in zip(np.asarray(com.value), known, strict=True)
+        each = zip(np.asarray(com.value), np.broadcast_to(com.std_error, 3), known, strict=True)
+        at = ", ".join(Estimate(x, e, "1").words(3) if one else "not determined" for x, e, one in each)
+        what = "a body" if number(mass.value) > 0 else "no longer a body that the model has,"
+        heavy = replace(mass, value=abs(number(mass.value)))
+        # the words know no arm, so they say by which rule its link is chosen
+        return (
+            f"{what} of {heavy.words()} on the last link, centre at ({at}) m in the frame of the link tool (of the last "
+            "moving link if the URDF has no tool)"
         )
-        return on_the_last_link(mass, at)
 
 
 def reach(arm: Arm) -> float:
@@ -154,16 +159,6 @@ def _within(com: Array, errors: Array, farthest: float) -> Array:
     near = pulled(brentq(lambda x: float(np.linalg.norm(pulled(x))) - 0.999 * farthest, 0.0, strongest))
     off = (near - found)[spread > 0] / spread[spread > 0]
     return near if np.linalg.norm(off) <= _HIDDEN else com
-
-
-def on_the_last_link(mass: Estimate, centre: str) -> str:
-    """A body in words; the words know no arm, so they say by which rule its link is chosen."""
-    kilograms = number(mass.value)
-    what = "a body" if kilograms > 0 else "no longer a body that the model has,"
-    return (
-        f"{what} of {abs(kilograms):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({centre}) m "
-        "in the frame of the link tool (of the last moving link if the URDF has no tool)"
-    )
 
 
 def link_parameters(arm: Arm, parameters: Values) -> Array:

@@ -46,7 +46,7 @@ class TorqueOffset(Law):
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         return (
             f"the torque reading of joint {self.joint} is off by {parameters['offset'].words()}: the sensor, "
-            "not the arm"
+            "unless the joint rubs harder one way by as much, which no motion tells apart"
         )
 
     def remedy(self, parameters: dict[str, Estimate]) -> str:
