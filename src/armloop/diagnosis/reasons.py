@@ -397,7 +397,7 @@ def _left_in_training(model: ReconstructedModel, j: int) -> float:
 
 
 def _rough(model: ReconstructedModel, joints: Sequence[int]) -> list[str]:
-    """A sentence on joints (0-based) of which the model leaves much, if not most, of the torque: it hides what is smaller."""
+    """A sentence on joints (0-based) of which the model leaves much of the torque, if not most: it hides what is smaller."""
     if not joints:
         return []
     shares = ", ".join(f"{_left_in_training(model, j):.0%} of joint {j + 1}'s torque" for j in joints)
