@@ -15,10 +15,8 @@ from armloop.data.motion import Motion, Samples
 from armloop.features.lagrangian import EnergyTerms, candidates
 from armloop.identification.reconstruction import lagrangian
 from armloop.identification.reconstruction.data import Chunk
-from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.lagrangian import _Problem, _Problems
 from armloop.identification.reconstruction.shared import FRICTION
-from armloop.model.components import Lagrangian
 from armloop.regression.moments import Moments
 from armloop.util.errors import ExcitationError
 
@@ -236,27 +234,6 @@ class TestOmissions:
         assert self.pruned(worth, [], 3.5) == [0]
         assert self.pruned(worth, [3, 1], 2.1) == [0, 1, 3]
         assert self.pruned(worth, [0, 1, 2, 3], 99.0) == [0, 1, 2, 3]
-
-
-class TestMassMatrix:
-    """T = v1² + v3² + (1/2 + cos q3) v2²: its mass of joint 2 is 1 + 2 cos q3."""
-
-    def said(self, q3: list[float], rest: float = 0.5) -> list[str]:
-        body = Lagrangian(terms("v1^2", "v2^2", "v3^2", "cos(q3)*v2^2"), np.array([1.0, rest, 1.0, 1.0]))
-        q = np.zeros((len(q3), 3))
-        q[:, 2] = q3
-        motion = Motion(np.arange(float(len(q))), q, 0 * q, 0 * q, np.array([0]))
-        return lagrangian._warnings(Found(three_axis(), [body]), motion, np.array([0.0]))
-
-    def test_the_part_of_the_postures_without_a_mass_matrix_is_told(self) -> None:
-        assert self.said([0.0, 1.0, 2.0]) == []  # 1 + 2 cos 2 > 0
-        assert self.said([0.0, np.pi, 1.0, 0.5]) == ["M(q) is not positive definite at 25.0% of the postures"]
-        assert self.said([0.0, 1.0], -1.5) == ["M(q) is not positive definite at 100.0% of the postures"]
-
-    def test_of_a_long_motion_a_thousand_postures_are_looked_at(self) -> None:
-        every_other = np.where(np.arange(2000) % 2, np.pi, 0.0).tolist()
-        assert self.said(every_other) == []
-        assert self.said(every_other[:1999]) == ["M(q) is not positive definite at 50.0% of the postures"]
 
 
 def test_torques_must_have_as_many_independent_values_as_there_are_candidates() -> None:

@@ -10,14 +10,12 @@ import pytest
 from synthetic import three_axis
 
 from armloop.data.motion import Motion
-from armloop.features.lagrangian import candidates
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import lagrangian, rigid_body
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.lagrangian import _Problem
 from armloop.identification.reconstruction.sums import StepSums
 from armloop.laws.friction import FrictionTerm
-from armloop.model.components import Lagrangian
 from armloop.regression.moments import Moments
 from armloop.robot.arm import load_arm
 from armloop.robot.newton_euler import mass_matrix
@@ -73,23 +71,11 @@ def test_an_error_is_round_off_at_least_and_of_no_sample_nothing() -> None:
     assert found == pytest.approx([1e-10 * exact.yy / 20, 0.0, 9.0], rel=1e-3)
 
 
-def said(errors: list[float], inertia: list[float] | None = None) -> list[str]:
-    """What is said of energies v1²/2 … of given inertias."""
-    arm = three_axis()
-    library = candidates(arm)
-    own = library.take(np.array([library.names.index(f"v{j}^2") for j in (1, 2, 3)]))
-    body = Lagrangian(own, np.array(inertia or [1.0, 1.0, 1.0]))
-    motion = Motion(np.arange(4.0), *np.zeros((3, 4, 3)), np.array([0]))
-    return lagrangian._warnings(Found(arm, [body]), motion, np.array(errors))
-
-
-def test_energies_that_leave_a_tenth_of_the_torque_or_make_no_mass_matrix_are_named() -> None:
-    assert said([0.05, 0.15, np.nan]) == [] and said([np.nan] * 3) == []
-    (note,) = said([0.05, 0.152, np.nan])
+def test_energies_that_leave_a_tenth_of_the_torque_are_named() -> None:
+    for errors in ([0.05, 0.15, np.nan], [np.nan] * 3):
+        assert lagrangian._warnings(np.array(errors)) == []
+    (note,) = lagrangian._warnings(np.array([0.05, 0.152, np.nan]))
     assert note.startswith("held-out nRMSE 0.10: the waves of the Lagrangian library do not suit")
-    for inertia in ([1.0, 1.0, -1e-3], [1.0, 0.0, 1.0]):
-        (note,) = said([0.0], inertia)
-        assert note == "M(q) is not positive definite at 100.0% of the postures"
 
 
 def test_the_search_of_energies_ends_after_eight_additions_without_a_gain(

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from armloop.data.filters import INDEPENDENT
-from armloop.data.motion import Motion, Samples
+from armloop.data.motion import Samples
 from armloop.data.pieces import LogSource
 from armloop.data.signals import as_torque, smooth
 from armloop.dynamics.physics import joint_limits
@@ -141,32 +141,26 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         *selection.notes,
         *laws.notes(final.effects),
         *physics_notes(final.history),
-        *_warnings(final, motion, selection.errors(theta)),
+        *_warnings(selection.errors(theta)),
     ]
     found.reports, found.notes = reports, notes
     return found
 
 
-def _warnings(final: Found, motion: Motion, errors: Array) -> list[str]:
-    """What speaks against the terms found: a mass matrix that is none, and torques not met on the held-out blocks.
+def _warnings(errors: Array) -> list[str]:
+    """What speaks against the terms found: torques not met on the held-out blocks.
 
     Args:
         errors: (n,) nRMSE there.
     """
-    warnings = []
-    (body,) = final.components
-    assert isinstance(body, Lagrangian)
-    lowest = np.linalg.eigvalsh(body.mass_matrix(motion.q[:: max(1, motion.samples // 1000)]))[:, 0]
-    if (lowest <= 0).any():
-        warnings.append(f"M(q) is not positive definite at {np.mean(lowest <= 0):.1%} of the postures")
     known = errors[np.isfinite(errors)]
     error = float(known.mean()) if len(known) else 0.0
-    if error > _POOR:
-        warnings.append(
-            f"held-out nRMSE {error:.2f}: the waves of the Lagrangian library do not suit this arm or these data "
-            "(axes that cross need more terms than short logs tell apart); try --library rigid-body"
-        )
-    return warnings
+    if error <= _POOR:
+        return []
+    return [
+        f"held-out nRMSE {error:.2f}: the waves of the Lagrangian library do not suit this arm or these data "
+        "(axes that cross need more terms than short logs tell apart); try --library rigid-body"
+    ]
 
 
 @dataclass(frozen=True, eq=False)
