@@ -130,9 +130,9 @@ class TestGains:
         assert taken().best() is None and taken((Effect("a", 1), {})).best() is None
 
     def test_what_the_training_logs_show_too_was_always_there(self) -> None:
-        for always in (True, False):
-            best = taken((Effect("a", 1), {0: _Gain(0.9, SURE, always)})).best()
-            assert best is not None and best.always == always
+        for always, rubs in ((True, True), (False, True), (True, False)):
+            best = taken((Effect("a", 1, rubs=rubs), {0: _Gain(0.9, SURE, always)})).best()
+            assert best is not None and best.always == (always and rubs)
 
     def test_the_largest_decides_the_joint_and_the_simplest_of_equals_is_named(self) -> None:
         simple, other, more = (

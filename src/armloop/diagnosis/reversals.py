@@ -326,7 +326,9 @@ class _Gains:
         best = min(equals, key=lambda effect: (effect.complexity, -there[effect]))
         enough = _ALTERNATIVE * there[best]
         rivals = [(e, share) for e, share in there.items() if e is not best and share >= enough]
-        return Found(best, Shape.fixed(0.0), there[best], rivals, self.by_effect[best][joint].always)
+        # of what acts while a joint slides as well, how much is left where joints turn round says nothing of the past
+        always = best.rubs and self.by_effect[best][joint].always
+        return Found(best, Shape.fixed(0.0), there[best], rivals, always)
 
 
 def _positive(ratios: Array) -> bool:
