@@ -41,7 +41,11 @@ def looked_at(
         asked["steps"].append((q0, dry, duration))
         return np.arange(3.0), np.tile(unit * (0.5 if dry else 0.9), (3, 1))
 
-    monkeypatch.setattr(tuned_loop, "posture_model", lambda arm, friction, q, effects=(): float(q[0]))
+    def posture(arm: Any, friction: Any, q: Any, effects: Any) -> float:
+        assert effects == ("rotors",)
+        return float(q[0])
+
+    monkeypatch.setattr(tuned_loop, "posture_model", posture)
     monkeypatch.setattr(tuned_loop, "SampledArm", SimpleNamespace(of=sample))
     monkeypatch.setattr(tuned_loop, "sampled_margins", margins)
     monkeypatch.setattr(tuned_loop, "cut_loop", lambda L, i: (i + 1) * L[1])
@@ -51,7 +55,12 @@ def looked_at(
     monkeypatch.setattr(tuned_loop, "run_tracking", lambda scenario, models: scenario)
     arm = SimpleNamespace(n=2, revolute=np.array([True, False]))
     scenario: Any = SimpleNamespace(
-        plant=SimpleNamespace(arm=arm, config=SimpleNamespace(time_step=0.01, friction=None)),
+        plant=SimpleNamespace(
+            arm=arm,
+            config=SimpleNamespace(
+                time_step=0.01, friction=None, with_rotors=lambda effects=(): ("rotors", *effects)
+            ),
+        ),
         reference=SimpleNamespace(
             duration=10.0,
             evaluate=lambda t: (np.repeat(np.atleast_1d(np.asarray(t, dtype=float))[:, None], 2, 1),) * 3,

@@ -220,6 +220,10 @@ def test_a_torque_that_nothing_explains_is_said() -> None:
     # what is predictable is a law that is missing, and said as such
     assert not replace(noise, predictable_left=0.5).little_is_explained
     held_out = SimpleNamespace(moving={"nrmse": [0.1, 0.9, None]})
-    made = SimpleNamespace(parts=[noise, replace(noise, explained=0.9)], held_out=held_out)
-    said = Reconstruction.warnings.fget(made)  # type: ignore[attr-defined]
-    assert said == [noise.little()]
+    faults: list[str] = []
+    model = SimpleNamespace(history={"physics": {"faults": faults}})
+    made = SimpleNamespace(parts=[noise, replace(noise, explained=0.9)], held_out=held_out, model=model)
+    assert Reconstruction.warnings.fget(made) == [noise.little()]  # type: ignore[attr-defined]
+    faults += ["friction drives joint 1", "M(q) is asymmetric"]
+    first, *_ = Reconstruction.warnings.fget(made)  # type: ignore[attr-defined]
+    assert first == "no arm has this model, whatever it leaves: friction drives joint 1; M(q) is asymmetric"

@@ -89,8 +89,10 @@ class Reconstruction:
 
     @property
     def warnings(self) -> list[str]:
-        """What must be said before anything else: joints of which the model leaves all, much, or nearly all."""
+        """What must be said before anything else: joints of which the model leaves all, much, or nearly all; no physics."""
+        faults = self.model.history["physics"]["faults"]
         much = of_no_use(self.held_out)
+        much += [f"no arm has this model, whatever it leaves: {'; '.join(faults)}"] if faults else []
         much += [one.sentence() for one in self.parts if one.much_is_left]
         return much + [one.little() for one in self.parts if one.little_is_explained]
 
