@@ -41,6 +41,13 @@ def swap_velocities(log: Arrays) -> None:
     log["v"][:, [0, 2]] = log["v"][:, [2, 0]]
 
 
+def exchange_joints_that_move_alike(log: Arrays) -> None:
+    """Joint 3 does, but for a fifth more of its own, what joint 1 does; their positions are exchanged."""
+    for key in ("q", "v"):
+        log[key][:, 2] = log[key][:, 0] + 0.6 * log[key][:, 2]
+    log["q"][:, [0, 2]] = log["q"][:, [2, 0]]
+
+
 def freeze(key: str) -> Callable[[Arrays], None]:
     def change(log: Arrays) -> None:
         fast = int(np.argmax(np.abs(log["v"][100:-150, 1]))) + 100
@@ -89,6 +96,10 @@ WRONG: dict[str, tuple[Callable[[Arrays], None], str]] = {
         r"column q2, row \d+.* stands still to the last digit for 0.99 s .* jumps by .* stuck; drop these rows",
     ),
     "v in another order": (swap_velocities, r"column v1 is not the rate of q1 .* v3 is"),
+    "joints that move alike, exchanged": (
+        exchange_joints_that_move_alike,
+        r"column v1 is not the rate of q1 .* v3 is",
+    ),
     "v of something else": (noise_for_v, r"column v2 has little to do with the rate of q2"),
     "v of the other sign": (scaled(-1.0, "v"), r"column v1 is -1 times .* opposite sign"),
     "a spike of q": (put("q", (500, 1), 1e6), r"column q2, row 501.* holds 1e\+06, more than any arm"),

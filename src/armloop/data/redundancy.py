@@ -144,7 +144,9 @@ def unlike(windows: Windows) -> Iterator[Finding]:
     for j in moving:
         own = similar[j, j]
         twin = max((k for k in moving if k != j), key=lambda k: abs(similar[j, k]), default=j)
-        if own >= 0.5:
+        # joints that move much alike may be exchanged as well
+        exchanged = min(abs(similar[j, twin]), abs(similar[twin, j])) > 0.95
+        if own >= (0.9 if exchanged else 0.5):
             continue
         if abs(similar[j, twin]) > 0.95:
             yield Finding(
