@@ -139,6 +139,10 @@ BAD_MAPS = {
     "unit": ("time: {column: t}\nq: {columns: [a], unit: furlong}\ntau: {columns: [b]}", "furlong"),
     "count": ("time: {column: t}\nq: {columns: [a, c]}\ntau: {columns: [b]}", "1 columns, but q has 2"),
     "sign": ("time: {column: t}\nq: {columns: [a], sign: 2}\ntau: {columns: [b]}", "sign must be"),
+    "scale": (
+        "time: {column: t}\nq: {columns: [a], scale: -0.1}\ntau: {columns: [b]}",
+        "every scale must be positive; say a direction with sign",
+    ),
     "both times": ("time: {column: t, rate: 3}\nq: {columns: [a]}\ntau: {columns: [b]}", "either column"),
     "rate": ("time: {rate: -3}\nq: {columns: [a]}\ntau: {columns: [b]}", "time.rate is -3"),
     "infinite": (

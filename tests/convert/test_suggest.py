@@ -274,3 +274,25 @@ def test_a_motion_log_that_is_not_in_si_units_is_not_called_sure(tmp_path, log, 
     place.write_text(place.read_text().replace("unit: s}", "unit: us}"))
     assert main(["convert", str(path), "--map", str(place), "--out", str(out)]) == 0
     np.testing.assert_allclose(read_log(out).time, log.time, atol=1e-9)
+
+
+def test_counts_are_asked_about_and_converted_by_what_one_is(tmp_path, log, capsys):
+    """A servo of 4096 counts per turn whose zero is at 2048, that turns the other way at its second joint."""
+    turned = log.q * np.array([1.0, -1.0, 1.0])
+    counts = np.round(turned / (2 * np.pi) * 4096) + 2048
+    names = ["time [s]", *per_joint("position{}", "load{} [Nm]")]
+    path = write(tmp_path / "servo.csv", names, [log.time, counts, log.tau], ",")
+    place, out = tmp_path / "map.yaml", tmp_path / "out.csv"
+    assert main(["convert", str(path), "--suggest", "--map", str(place)]) == 0
+    assert "whole numbers: counts? Then unit: rev, scale:" in capsys.readouterr().out
+    text = place.read_text()
+    assert "unit: '?'  # unsure: from" in text
+    given = f"unit: rev\n  scale: {1 / 4096}\n  offset: -2048\n  sign: [1, -1, 1]  # asked: from"
+    place.write_text(text.replace("unit: '?'  # unsure: from", given, 1))
+    assert main(["convert", str(path), "--map", str(place), "--out", str(out)]) == 0
+    np.testing.assert_allclose(read_log(out).q, log.q, atol=0.51 * 2 * np.pi / 4096)
+    # what is no whole number, or goes no farther than radians do, is none
+    for cells in (counts + 0.5, np.round(log.q)):
+        path = write(tmp_path / "other.csv", names, [log.time, cells, log.tau], ",")
+        assert main(["convert", str(path), "--suggest"]) == 0
+        assert "rad or deg?" in capsys.readouterr().out

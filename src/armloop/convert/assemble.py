@@ -340,7 +340,7 @@ def _column(recording: Recording, quantity: QuantityMap, kind: str, j: int) -> A
     n, name = len(quantity.names()), quantity.names()[j]
     cells = _cells(recording, name, f", which {kind} of joint {j + 1} needs", "or drop what was not measured")
     unit = canonical(quantity.units()[j] or "", kind)
-    factor = FACTORS[kind][unit] if unit is not None else 1.0
+    factor = (FACTORS[kind][unit] if unit is not None else 1.0) * per_joint(quantity.scale, n)[j]
     if quantity.gains is not None:
         factor = factor * per_joint(quantity.gains, n)[j]
     return (cells + per_joint(quantity.offset, n)[j]) * (factor * per_joint(quantity.sign, n)[j])

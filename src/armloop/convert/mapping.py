@@ -11,7 +11,9 @@ The file is YAML, one field per quantity; what it leaves out is not in the sourc
     keep: all                                # or the names of further columns to keep, or []
 
 A number, unit or sign stands for all joints, a list gives one per joint. An ``offset`` is in the column's unit
-and added before the sign. ``"i_{1..2}"`` stands for ``[i_1, i_2]``. A ``?`` is a question still to be answered.
+and added before the sign. A column that counts has a ``scale``, what one count is in the unit: of a servo with 4096
+counts per turn whose zero is at 2048, ``{unit: rev, scale: 0.000244140625, offset: -2048}``. ``"i_{1..2}"`` stands for ``[i_1, i_2]``. A ``?`` is a question
+still to be answered.
 """
 
 from __future__ import annotations
@@ -50,6 +52,7 @@ class QuantityMap(msgspec.Struct, forbid_unknown_fields=True):
     unit: str | list[str] | None = None
     sign: Finite | list[Finite] = 1.0
     offset: Finite | list[Finite] = 0.0
+    scale: Finite | list[Finite] = 1.0
     gains: Finite | list[Finite] | None = None
 
     def names(self) -> list[str]:
@@ -144,14 +147,16 @@ def check_map(mapping: Mapping, where: str) -> None:
             raise InputError(
                 f"{where}: {name}: {len(quantity.names())} columns, but q has {n}; give one per joint"
             )
-        for field in ("unit", "sign", "offset", "gains"):
+        for field in ("unit", "sign", "offset", "scale", "gains"):
             value = getattr(quantity, field)
             if isinstance(value, list) and len(value) != n:
                 raise InputError(f"{where}: {name}: {field} has {len(value)} entries; give one, or {n}")
         for unit in quantity.units():
             _check_unit(unit, name, where)
         if any(abs(sign) != 1 for sign in per_joint(quantity.sign, n)):
-            raise InputError(f"{where}: {name}: sign must be 1 or -1")
+            raise InputError(f"{where}: {name}: sign must be 1 or -1; what a column counts in is its scale")
+        if not all(scale > 0 for scale in per_joint(quantity.scale, n)):
+            raise InputError(f"{where}: {name}: every scale must be positive; say a direction with sign")
         if quantity.gains is not None and name != "tau":
             raise InputError(f"{where}: {name}: gains belong to tau alone (N·m per A, or per % of a rating)")
         if quantity.gains is not None and not all(gain > 0 for gain in per_joint(quantity.gains, n)):

@@ -17,6 +17,8 @@ from armloop.convert.units import FACTORS, RATES, canonical, fitting, time_unit
 from armloop.robot.arm import Arm
 
 _BARE = re.compile(r"[A-Za-z_][\w./ +-]*")
+#: Whole numbers that go so far are likely counts of an encoder.
+_COUNTS = 50
 _YAML_WORDS = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 
 
@@ -39,9 +41,7 @@ def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str,
     for kind, quantity in (("q", mapping.q), ("v", mapping.v)):
         if quantity is not None and None in quantity.units() and UNSAID not in quantity.names():
             unsure[f"{kind}.unit"] = (
-                f"{_range(recording, quantity)}: rad or deg?"
-                if kind == "q"
-                else _rates_that_fit(recording, mapping)
+                _of_positions(recording, quantity) if kind == "q" else _rates_that_fit(recording, mapping)
             )
     if mapping.time.column is not None and mapping.time.unit is None:
         unsure["time.unit"] = _time_evidence(recording, mapping)
@@ -49,6 +49,15 @@ def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str,
     if mapping.v is not None and known and not {"q.unit", "v.unit", "time.unit", "v"} & {*unsure}:
         unsure |= _contradiction(recording, mapping, mapping.v)
     return mapping, unsure
+
+
+def _of_positions(recording: Recording, quantity: QuantityMap) -> str:
+    """The question of a position's unit: of whole numbers that go far, whether they are counts."""
+    cells = [np.asarray(recording.columns[name], dtype=float) for name in quantity.names()]
+    if all((x == np.round(x)).all() for x in cells) and max(np.ptp(x) for x in cells) > _COUNTS:
+        counts = "whole numbers: counts? Then unit: rev, scale: 1 over the counts of a turn, offset: minus that at zero"
+        return f"{_range(recording, quantity)}, {counts}; or deg?"
+    return f"{_range(recording, quantity)}: rad or deg?"
 
 
 def _contradiction(recording: Recording, mapping: Mapping, v: QuantityMap) -> dict[str, str]:
