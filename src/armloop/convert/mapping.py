@@ -12,8 +12,8 @@ The file is YAML, one field per quantity; what it leaves out is not in the sourc
 
 A number, unit or sign stands for all joints, a list gives one per joint. An ``offset`` is in the column's unit
 and added before the sign. A column that counts has a ``scale``, what one count is in the unit: of a servo with 4096
-counts per turn whose zero is at 2048, ``{unit: rev, scale: 0.000244140625, offset: -2048}``. ``"i_{1..2}"`` stands for ``[i_1, i_2]``. A ``?`` is a question
-still to be answered.
+counts per turn whose zero is at 2048, ``{unit: rev, scale: 0.000244140625, offset: -2048}``. ``"i_{1..2}"`` stands
+for ``[i_1, i_2]``. A ``?`` is a question still to be answered.
 """
 
 from __future__ import annotations
