@@ -264,17 +264,19 @@ class TestReasons:
     def test_most_joints_far_above_the_baseline_are_another_arm_or_another_record(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        words, _ = self.standing(monkeypatch, [1.0, 0.9, 1.0])
+        words, _ = self.standing(monkeypatch, [2.0, 0.9, 1.0])
         assert words[0].startswith("2 of 3 joints leave 2 times the baseline or more") and len(words) == 3
         assert "a log of arm with its order of joints, zeros, units and drive gains" in words[0]
+        # not of a run that is but faster than those of the baseline
+        assert self.standing(monkeypatch, [1.9, 0.9, 1.9])[0] == ["1 3.8", "3 3.8"]
         # most, but of joints that can be judged, and one alone is no arm
-        assert self.standing(monkeypatch, [1.0, 0.9, 0.9])[0] == ["1 2"]
-        assert self.standing(monkeypatch, [1.0, None, 1.0], slides=19)[0][0].startswith("2 of 2 joints")
+        assert self.standing(monkeypatch, [2.0, 0.9, 0.9])[0] == ["1 4"]
+        assert self.standing(monkeypatch, [1.0, None, 2.0], slides=19)[0][0].startswith("2 of 2 joints")
         # a stop at the end of the log is felt by all of them, and nothing that the motion tells of
         assert self.standing(monkeypatch, [1.0, 1.0, 1.0], real=(False,) * 3)[0] == ["1 2", "2 2", "3 2"]
         # a residual that the verdict names is left all the same, unless its law removes it
-        words, _ = self.standing(monkeypatch, [1.0, 1.0, 0.9], explained=[1])
-        assert words[0].startswith("2 of 3 joints leave") and words[1:] == ["1 2", "2 2"]
+        words, _ = self.standing(monkeypatch, [2.0, 1.0, 0.9], explained=[1])
+        assert words[0].startswith("2 of 3 joints leave") and words[1:] == ["1 4", "2 2"]
         assert self.standing(monkeypatch, [0.6, 1.0, 0.9], explained=[1])[0] == ["2 2"]
 
     def test_a_joint_that_hardly_slides_or_lies_far_outside_cannot_be_judged(
