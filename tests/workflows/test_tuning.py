@@ -99,17 +99,20 @@ class TestInertiaOfAnother:
     ROTORS = (0.4, 0.3, 0.2)
 
     def told(
-        self, *rotors: float, effects: tuple[UndeclaredEffect, ...] = (), links: float | None = None
+        self,
+        *rotors: float,
+        effects: tuple[UndeclaredEffect, ...] = (),
+        links: float = 1.0,
+        lost: tuple[float, ...] = (0.0, 0.0, 0.0),
     ) -> str:
         plant = load_tracking("three_axis_tracking").plant
-        config = dataclasses.replace(plant.config, rotor_inertia=self.ROTORS)
+        own = tuple(x - less for x, less in zip(self.ROTORS, lost, strict=True))
+        config = dataclasses.replace(plant.config, rotor_inertia=own)
         model = exact_model(plant.arm, config.friction, config.with_rotors())
-        if links is not None:
-            nothing = np.zeros(0)
-            body = RigidBody(links * nominal_parameters(plant.arm), (), nothing)
-            model = dataclasses.replace(model, components=(body,), effects=())
-        own = dataclasses.replace(plant, config=dataclasses.replace(plant.config, rotor_inertia=rotors))
-        return other_inertia(model, own, [0.0, 0.5, -0.5], effects)
+        body = RigidBody(links * nominal_parameters(plant.arm), (), np.zeros(0))
+        model = dataclasses.replace(model, components=(body,))
+        known = dataclasses.replace(plant, config=dataclasses.replace(plant.config, rotor_inertia=rotors))
+        return other_inertia(model, known, [0.0, 0.5, -0.5], effects)
 
     def test_rotors_that_a_urdf_does_not_state_are_said_with_what_to_state(self) -> None:
         assert "rotor_inertia: [0.4, 0.3, 0.2]" in self.told()
@@ -117,8 +120,13 @@ class TestInertiaOfAnother:
         # what is stated already is a part of it
         assert "rotor_inertia: [0.4, 0.3, 0.2]" in self.told(0.01, 0.0, 0.0)
         assert "rotor_inertia: [0.4, 0.3, 0.2]" in self.told(3.0, 3.0, 3.0)
+        # of a joint that is hardly another
+        assert "rotor_inertia: [0, 0.2" in self.told(links=0.98, lost=(0.4, 0.0, 0.0))
         # no rotor makes an arm lighter than its links
-        assert "where the model has" in (words := self.told(links=0.1)) and "rotor_inertia" not in words
+        assert (
+            "where the model has" in (words := self.told(links=0.1, lost=self.ROTORS))
+            and "rotor_inertia" not in words
+        )
 
     def test_an_effect_that_nobody_declared_is_no_other_arm(self) -> None:
         more = tuple(

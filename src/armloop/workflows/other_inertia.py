@@ -38,9 +38,10 @@ def other_inertia(model: ReconstructedModel, plant: Plant, q0: ArrayLike, effect
     ]
     said = f"the simulated arm's inertia is another than the model's (kg m², kg): {', '.join(each)}"
     rotors = np.array(plant.config.rotor_inertia or np.zeros(plant.arm.n)) + known - bare
-    if (rotors < 0).any():
+    if (rotors < 0)[other].any():
         return said
-    stated = ", ".join(f"{x:.3g}" for x in rotors)
+    # links of other joints that the model has a little lighter than the URDF are no matter of rotors
+    stated = ", ".join(f"{max(x, 0.0):.3g}" for x in rotors)
     return (
         f"{said}; a URDF states no rotors: with own_plant: {{rotor_inertia: [{stated}]}} it has the model's"
     )
