@@ -86,6 +86,18 @@ def test_numbers_out_of_turn_need_the_arm(tmp_path, log):
         convert([path], answers=TORQUE)
 
 
+def test_positions_that_no_joint_of_the_arm_reaches_are_said_at_once(tmp_path, log):
+    """As of degrees that a map calls revolutions: the later commands would say it of a log that is written."""
+    limited = [replace(joint, lower=-3.0, upper=3.0) for joint in three_axis().joints]
+    arm = replace(three_axis(), joints=tuple(limited))
+    turned = replace(log, q=log.q + np.array([0.0, 9.0, 0.0]))
+    path = bag(tmp_path / "bag", turned, [0, 1, 2], kind="db3", names=arm.joint_names)
+    with pytest.warns(
+        InputWarning, match=r"column q2 goes from .* limits of .* are -3 to 3; check its zero, its unit"
+    ):
+        convert([path], arm=arm, answers=TORQUE)
+
+
 def test_one_prefix_tells_the_arms_joints_from_a_fingers():
     names = ["panda_joint2", "panda_finger_joint1", "panda_joint1"]
     assert match(names, ["joint1", "joint2"], "") == [2, 0]

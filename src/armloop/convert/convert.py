@@ -15,6 +15,7 @@ from armloop.convert.recording import Array, Recording
 from armloop.data.log import MotionLog, check_log
 from armloop.data.repeats import same_measurement
 from armloop.robot.arm import Arm
+from armloop.robot.plausibility import beyond_limits
 from armloop.util.doubts import warn
 from armloop.util.errors import LogError
 
@@ -81,6 +82,8 @@ def convert(
                 warn(f"{paths[k]}: holds the measurement of {paths[j]} once more; give each measurement once")
     log, extra = joined(parts)
     check_log(Path(paths[0]), log)
+    for sentence in [] if arm is None else beyond_limits(arm, log):
+        warn(f"{paths[0]}: {sentence}")
     notes = []
     for path, one in zip(paths, parts, strict=True):
         head = f"{Path(path).name}: " if len(parts) > 1 else ""
