@@ -17,6 +17,7 @@ from armloop.robot.kinematics import nominal_parameters
 from armloop.util.errors import InputWarning
 from armloop.util.progress import silent
 from armloop.workflows import tune_scenario
+from armloop.workflows.other_friction import other_friction
 from armloop.workflows.other_inertia import other_inertia
 
 
@@ -91,6 +92,27 @@ def test_a_model_of_another_inertia_than_the_simulated_arms_is_said(factor, said
         tune_scenario(scenario, 30.0, 60.0, model, None, silent)
     told = [str(w.message) for w in caught if "for the model's inertia" in str(w.message)]
     assert bool(told) == said and (not said or "at joint 3" in told[0])
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.4, False), (1.6, True), (1 / 1.6, True)])
+def test_friction_that_is_another_than_the_models_is_said_with_what_to_state(
+    factor: float, said: bool
+) -> None:
+    plant = load_tracking("three_axis_tracking").plant
+    model = exact_model(plant.arm, plant.config.friction)
+    more = tuple(
+        dataclasses.replace(
+            f, static=factor * f.static, coulomb=factor * f.coulomb, viscous=factor * f.viscous
+        )
+        for f in plant.config.friction
+    )
+    other = dataclasses.replace(plant, config=dataclasses.replace(plant.config, friction=more))
+    words = other_friction(model, other)
+    assert bool(words) == said and other_friction(model, plant) == ""
+    if said:
+        first = plant.config.friction[0]
+        assert "at joint 1" in words and "at joint 3" in words
+        assert f"{{static: {first.static:.3g}, coulomb: {first.coulomb:.3g}, stribeck_velocity: " in words
 
 
 class TestInertiaOfAnother:
