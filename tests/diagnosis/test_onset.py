@@ -220,17 +220,29 @@ def test_of_several_logs_the_one_that_it_begins_in_is_found(model: Reconstructed
 
 
 @pytest.mark.parametrize(
-    ("likely", "worth", "gradual", "of_motion", "told"),
+    ("likely", "worth_than", "found", "ahead", "gradual", "of_motion", "told"),
     [
-        (1.0, True, False, False, True),
-        (-1.0, True, False, False, False),  # what was found without it is likelier
-        (1.0, False, False, False, False),  # the same effect all the while is as good
-        (1.0, True, True, False, False),
-        (1.0, True, False, True, False),
+        (1.0, "constant", True, 9.0, False, False, True),
+        (-1.0, "constant", True, 9.0, False, False, False),  # what was found without it is likelier
+        (1.0, "", True, 9.0, False, False, False),  # the same effect all the while is as good
+        (1.0, "constant", True, 9.0, True, False, False),
+        (1.0, "constant", True, 9.0, False, True, False),
+        # of one that was not found all the while it is enough to be worth it, and plainly better than that
+        (1.0, "bare", False, 3.1, False, False, True),
+        (1.0, "bare", False, 2.9, False, False, False),
+        (1.0, "bare", True, 3.1, False, False, False),
+        (1.0, "", False, 3.1, False, False, False),
     ],
 )
 def test_it_must_be_likelier_than_all_else_worth_more_than_all_the_while_and_of_time_alone(
-    likely: float, worth: bool, gradual: bool, of_motion: bool, told: bool, monkeypatch: pytest.MonkeyPatch
+    likely: float,
+    worth_than: str,
+    found: bool,
+    ahead: float,
+    gradual: bool,
+    of_motion: bool,
+    told: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     rows = np.ones((4, 3), dtype=bool)
     evidence = SimpleNamespace(rows=rows)
@@ -241,13 +253,20 @@ def test_it_must_be_likelier_than_all_else_worth_more_than_all_the_while_and_of_
     points: Any = SimpleNamespace(
         gradual=lambda *asked: asked == (part, 7) and gradual, of_motion=lambda *asked: of_motion
     )
-    constant = SimpleNamespace(fit=SimpleNamespace(score="constant"))
-    monkeypatch.setattr(onset.Known, "of", staticmethod(lambda *given: constant))
+
+    def known(evidence: Any, effects: Any, shapes: Any) -> Any:
+        return SimpleNamespace(fit=SimpleNamespace(score="constant" if effects else "bare"))
+
+    monkeypatch.setattr(onset.Known, "of", staticmethod(known))
     monkeypatch.setattr(
-        onset, "is_worth", lambda _, plain, gated, *rest: (plain, gated) == ("constant", "gated") and worth
+        onset, "is_worth", lambda _, plain, gated, *rest: (plain, gated) == (worth_than, "gated")
+    )
+    monkeypatch.setattr(
+        onset, "lead", lambda worse, better: ahead if (worse, better) == ("constant", "gated") else 0.0
     )
     monkeypatch.setattr(onset, "posterior", lambda account, residual, rows: 0.0)
-    account: Any = SimpleNamespace(contacts=[], evidence=evidence)
+    stated = [SimpleNamespace(effect=part.effect)] if found else []
+    account: Any = SimpleNamespace(contacts=[], evidence=evidence, outcome=SimpleNamespace(found=stated))
     assert onset._is_told(points, judged, account, np.zeros((4, 3))) == told
 
 

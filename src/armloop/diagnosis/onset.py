@@ -19,7 +19,7 @@ from armloop.diagnosis.change_points import ChangePoints, Judged, Part, Shaped, 
 from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
-from armloop.diagnosis.judgement import enough, gain, is_worth
+from armloop.diagnosis.judgement import SIGNIFICANCE, enough, gain, is_worth, lead
 from armloop.diagnosis.outcomes import Found
 from armloop.diagnosis.search import ALTERNATIVE, MOST_EFFECTS, ROUNDS, told
 from armloop.diagnosis.trials import Known
@@ -177,9 +177,14 @@ def _is_told(points: ChangePoints, judged: Judged, account: Account, residual: A
     effects, shapes = zip(
         *{e.place: (e, s) for e, s in ((part.effect, part.shape), *part.others)}.values(), strict=True
     )
-    constant = Known.of(evidence, effects, shapes).fit.score
+    constant, mine = Known.of(evidence, effects, shapes).fit.score, judged.score(rows)
     ties = 1 if part.effect.other_joint is None else 2
-    worth = is_worth(evidence, constant, judged.score(rows), ties, part.effect)
+    worth = is_worth(evidence, constant, mine, ties, part.effect)
+    if not worth and part.effect.place not in {f.effect.place for f in account.outcome.found}:
+        # all the while it was not clear enough to be found: it is worth it beside nothing, and plainly not all the while
+        others, their = zip(*part.others, strict=True) if part.others else ((), ())
+        bare = Known.of(evidence, others, their).fit.score
+        worth = is_worth(evidence, bare, mine, ties, part.effect) and lead(constant, mine) > SIGNIFICANCE
     return worth and not points.gradual(part, judged.cut) and not points.of_motion(part, judged.cut)
 
 
