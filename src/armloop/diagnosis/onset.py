@@ -183,8 +183,8 @@ def _is_told(points: ChangePoints, judged: Judged, account: Account, residual: A
     if not worth and part.effect.place not in {f.effect.place for f in account.outcome.found}:
         # all the while it was not clear enough to be found: it is worth it beside nothing, and plainly not all the while
         others, their = zip(*part.others, strict=True) if part.others else ((), ())
-        bare = Known.of(evidence, others, their).fit.score
-        worth = is_worth(evidence, bare, mine, ties, part.effect) and lead(constant, mine) > SIGNIFICANCE
+        least = Known.of(evidence, others, their).fit.score
+        worth = is_worth(evidence, least, mine, ties, part.effect) and lead(constant, mine) > SIGNIFICANCE
     return worth and not points.gradual(part, judged.cut) and not points.of_motion(part, judged.cut)
 
 
