@@ -13,13 +13,14 @@ from rubbing_arm import model_with_baseline, motion_of, run, torque
 from synthetic import measured
 
 from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose, onset
 from armloop.diagnosis.change_points import ChangePoints, Part
 from armloop.diagnosis.contacts import without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
-from armloop.laws.effects import effect, hypotheses
+from armloop.laws.effects import Context, effect, hypotheses
 from armloop.model import ReconstructedModel, load_model
 from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.schemas.answers import DiagnosisData
@@ -97,6 +98,32 @@ def test_an_encoder_that_slips_is_one_offset_since_then(model: ReconstructedMode
 
 
 @pytest.mark.long
+def test_a_body_is_asked_about_and_what_fades_by_itself_is_not(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(onset, "_asked", lambda account: np.ones(3, dtype=bool))
+    account: Any = SimpleNamespace(outcome=SimpleNamespace(after=SimpleNamespace(effects=[], shapes=[])))
+    asked = {e.name for e, _ in onset._hypotheses(points_of(model, log_of(1)).evidence, account)}
+    assert {"payload", "coulomb_friction", "joint_spring"} <= asked
+    assert not {"friction_drift", "carried_load", "torque_ripple"} & asked
+
+
+@pytest.mark.long
+def test_a_tool_that_is_lost_within_a_run_is_a_body_that_is_gone_since(model: ReconstructedModel) -> None:
+    body = {"mass": -0.4, "com": [0.05, 0.0, 0.1], "own_inertia": 0.0}
+
+    def lost(motion: Motion) -> np.ndarray:
+        torque = effect("payload", None).torque(Context(model.arm, motion), body)
+        return torque * (motion.time >= 17.0)[:, None]
+
+    found = diagnose(model, [log_of(4, lost)], jobs=1)
+    assert found.named == [("payload", None)] and not found.contacts
+    (entry,) = found.to_dict()["effects"]
+    mass, since = entry["parameters"]["mass"], entry["since"]
+    assert abs(mass["value"] + 0.4) < 3 * mass["std_error"] < 0.2
+    assert abs(since["value"] - 17.0) < 3 * since["std_error"] < 1.0
+
+
 def test_what_ended_is_an_event_of_the_run_and_no_controller_supplies_it(model: ReconstructedModel) -> None:
     log = log_of(3, lambda m: (m.time < 14.0)[:, None] * m.v * [0.3, 0.0, 0.0])
     found = diagnose(model, [log], jobs=1)

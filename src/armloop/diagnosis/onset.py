@@ -26,6 +26,7 @@ from armloop.diagnosis.trials import Known
 from armloop.diagnosis.unlisted import law_log_prior
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.found import RANGE
+from armloop.laws.effects.payload import Payload
 from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress
 
@@ -134,12 +135,16 @@ def _likeliest(points: ChangePoints, account: Account, least: float) -> Iterator
 
 
 def _hypotheses(evidence: Evidence, account: Account) -> Iterator[Shaped]:
-    """Effects that may begin within a run: linear in their coefficients, with the nonlinear parameter found, or of none."""
+    """Effects that may begin within a run: linear in their coefficients, with the nonlinear parameter found, or of none.
+
+    A body that is lost within a run, or gained for the rest of it, is one whose first guess is linear.
+    """
     after = account.outcome.after
     known = {e.place: shape for e, shape in zip(after.effects, after.shapes, strict=True)}
     asked = _asked(account)
     for effect in hypotheses(evidence.model.arm):
-        if effect.of_time or not effect.linear or not all(evidence.rows[:, j].any() for j in effect.indices):
+        may_begin = effect.linear or isinstance(effect, Payload)
+        if effect.of_time or not may_begin or not all(evidence.rows[:, j].any() for j in effect.indices):
             continue
         tried = evidence.tried(effect)
         shape = known.get(effect.place) or (Shape.fixed(tried[0]) if len(tried) == 1 else None)
