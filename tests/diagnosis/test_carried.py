@@ -200,7 +200,7 @@ def test_a_tool_that_was_taken_off_is_a_body_less(model: ReconstructedModel) -> 
     mass, com = (np.asarray(added.parameters[key].value) for key in ("mass", "com"))
     assert abs(float(mass) + 0.4) < 0.005
     np.testing.assert_allclose(com, LOAD["com"], atol=0.005)
-    assert "no longer a body that the model has, of 0.4" in added.effect.sentence(added.parameters)
+    assert "no longer a body that the model has, of" in added.effect.sentence(added.parameters)
     # the augmented model is that of the bare arm
     left = found.model.predict(motion) - tau
     assert (np.sqrt((left[50:-50] ** 2).mean(axis=0)) < 0.1 * np.sqrt((tau**2).mean(axis=0))).all()
