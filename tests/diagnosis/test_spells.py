@@ -83,7 +83,8 @@ def test_friction_that_comes_and_goes_is_told_with_its_times(dragging: Diagnosis
     error = dragging.errors()
     assert max(np.divide(error["after"], error["noise_floor"])) < 1.2
     words = f"from {during['start'][0]:.1f} to {during['end'][0]:.1f} s and from {during['start'][1]:.1f} to"
-    assert words in " ".join(diagnosis_table(dragging).split())
+    said = " ".join(diagnosis_table(dragging).split())
+    assert words in said and f"{during['end'][1]:.1f} s of run_1" in said and during["log"] == ["run_1"] * 2
 
 
 def test_the_augmented_model_has_it_then_and_no_controller_supplies_it(

@@ -118,7 +118,9 @@ class Account:
         instead = len(first.found) + len(self.laws) + 1
         barred = [there[0].place]
         again = search(evidence, progress, panel, barred=barred, most=instead, worth=does_better)
-        law, outcome = find_law(evidence, again, progress) if again.found else (None, again)
+        if not again.found:
+            return self
+        law, outcome = find_law(evidence, again, progress)
         other = replace(self, outcome=outcome, unlisted=None, further=())
         return other if law is None and does_better(other.score(evidence.rows)) else self
 

@@ -48,7 +48,7 @@ def test_it_is_there_within_them_and_in_no_other_log() -> None:
 
 
 def test_it_is_told_with_its_times() -> None:
-    assert SPELLS.words() == "from 0.4 to 1.2 s of a_run and from 2.0 to 2.8 s of a_run"
+    assert SPELLS.words() == "from 0.4 to 1.2 s and from 2.0 to 2.8 s of a_run"
     first = replace(SPELLS.intervals[0], log="")
     assert added(Spells((first,), 0.05)).sentence().endswith(", from 0.4 to 1.2 s")
     words, times = zip(*SPELLS.instants, strict=True)

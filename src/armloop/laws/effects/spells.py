@@ -61,9 +61,11 @@ class Spells:
         return [pair for own in self.intervals for pair in (("from", own.start), ("to", own.end))]
 
     def words(self) -> str:
-        """Such as ``from 11.3 to 19.0 s and from 28.1 to 36.0 s``."""
-        each = (f"from {i.start:.1f} to {i.end:.1f} s" + f" of {i.log}" * bool(i.log) for i in self.intervals)
-        return " and ".join(each)
+        """Such as ``from 11.3 to 19.0 s and from 28.1 to 36.0 s of run_7``; of several logs each with its own."""
+        last = [i.log for i in self.intervals[1:]]
+        said = [i.log != after for i, after in zip(self.intervals, [*last, ""], strict=True)]
+        each = zip(self.intervals, said, strict=True)
+        return " and ".join(f"from {i.start:.1f} to {i.end:.1f} s" + f" of {i.log}" * say for i, say in each)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values, as in ``diagnosis.json``."""
