@@ -17,8 +17,7 @@ from armloop.robot.kinematics import nominal_parameters
 from armloop.util.errors import InputWarning
 from armloop.util.progress import silent
 from armloop.workflows import tune_scenario
-from armloop.workflows.other_friction import other_friction
-from armloop.workflows.other_inertia import other_inertia
+from armloop.workflows.other_arm import other_friction, other_inertia
 
 
 def test_files_tables_and_a_better_loop(tmp_path):
@@ -110,6 +109,17 @@ def test_friction_that_is_another_than_the_models_is_said_with_what_to_state(
     words = other_friction(model, other)
     assert bool(words) == said and other_friction(model, plant) == ""
     if said:
+        # it is no other arm if an effect is what makes the difference, declared to the model or not
+        rising = tuple(
+            UndeclaredEffect(name, j, {key: (1 / factor - 1) * size})
+            for j, f in enumerate(more, 1)
+            for name, key, size in (
+                ("coulomb_friction", "level", f.coulomb),
+                ("viscous_friction", "coefficient", f.viscous),
+            )
+            if factor < 1
+        )
+        assert not rising or other_friction(model, other, rising) == ""
         first = plant.config.friction[0]
         assert "at joint 1" in words and "at joint 3" in words
         assert f"{{static: {first.static:.3g}, coulomb: {first.coulomb:.3g}, stribeck_velocity: " in words

@@ -186,7 +186,7 @@ def _is_told(points: ChangePoints, judged: Judged, account: Account, residual: A
     ties = 1 if part.effect.other_joint is None else 2
     worth = is_worth(evidence, constant, mine, ties, part.effect)
     if not worth and part.effect.place not in {f.effect.place for f in account.outcome.found}:
-        # all the while it was not clear enough to be found: it is worth it beside nothing, and plainly not all the while
+        # what was not found all the while need not be worth more than that: but worth it, and plainly not all the while
         others, their = zip(*part.others, strict=True) if part.others else ((), ())
         least = Known.of(evidence, others, their).fit.score
         worth = is_worth(evidence, least, mine, ties, part.effect) and lead(constant, mine) > SIGNIFICANCE

@@ -419,15 +419,13 @@ def _multiple(part: Parts, j: int, ratio: float, found: bool = False) -> tuple[s
     size = f"joint {j + 1}: {'what is left' if found else 'the residual'} is {ratio:.1f} times the baseline"
     left, error, noise = part.predictable_left, part.std_error, part.noise
     if left is None or error is None or noise is None:
-        weak = ratio < MULTIPLE**2
-        return (
-            f"{size}: something is there, too weak or too short on this run to be named; the motion of --next-run would "
-            "show it"
-            if weak
-            else f"{size}: something is there that no listed effect nor a law that is stated accounts for, as play in a "
-            "gear may be; the motion of --next-run may tell more",
-            True,
+        what = (
+            "too weak or too short on this run to be named; the motion of --next-run would show it"
+            if ratio < MULTIPLE**2
+            else "and no listed effect nor a law that is stated accounts for it, as of play in a gear; the motion of "
+            "--next-run may tell more"
         )
+        return f"{size}: something is there, {what}", True
     much = (1 - NEARLY_ALL) * (left + noise)
     if left > max(SIGNIFICANCE * error, much):
         return (

@@ -92,9 +92,14 @@ class PhysicsChecks:
         return self.yaw is None or self.yaw <= _NOTABLE
 
     @property
+    def failed(self) -> int:
+        """How many of these do not hold."""
+        return [self.definite, self.symmetric, self.passive, self.level].count(False)
+
+    @property
     def passed(self) -> bool:
         """Whether all of it holds."""
-        return self.definite and self.symmetric and self.passive and self.level
+        return not self.failed
 
     def faults(self) -> list[str]:
         """What does not hold, where, and by how much: a line each."""

@@ -37,8 +37,7 @@ from armloop.util.errors import ModelError
 from armloop.util.files import write_figure, write_json
 from armloop.util.finite import finite
 from armloop.util.progress import Progress
-from armloop.workflows.other_friction import other_friction
-from armloop.workflows.other_inertia import other_inertia
+from armloop.workflows.other_arm import other_friction, other_inertia
 
 SCHEMA = "armloop/tracking/1"
 
@@ -105,17 +104,11 @@ def _say_doubts(scenario: TrackingScenario, models: Mapping[str, ReconstructedMo
         say_other_stance(scenario.plant.arm, gravity, model.arm, f"{scenario.name}, model {name}")
         for words in extrapolated(scenario.plant.arm, motion, model.history.get("range")):
             warn(f"{scenario.name}, model {name}: {words}; what it feeds forward there is extrapolated")
-    for words in dict.fromkeys(other_friction(model, scenario.plant) for model in models.values()):
-        if words:
-            warn(f"{scenario.name}: {words}")
+    rubs = (other_friction(model, scenario.plant, scenario.effects) for model in models.values())
+    weighs = (_other_inertia(scenario, model) for name, model in models.items() if _moves(name))
     # of one model under several names it is said once
-    for words in dict.fromkeys(
-        _other_inertia(scenario, model) for name, model in models.items() if _moves(name)
-    ):
-        if words:
-            warn(
-                f"{scenario.name}: {words}; as it is, what a model feeds forward for the acceleration does not suit the arm"
-            )
+    for words in filter(None, dict.fromkeys([*rubs, *weighs])):
+        warn(f"{scenario.name}: {words}; as it is, what is fed forward is another arm's")
 
 
 def _moves(name: str) -> bool:

@@ -18,7 +18,7 @@ from armloop.util.doubts import warn
 from armloop.util.files import write_figure, write_json, write_text
 from armloop.util.finite import finite
 from armloop.util.progress import Progress
-from armloop.workflows.other_inertia import other_inertia
+from armloop.workflows.other_arm import other_inertia
 
 SCHEMA = "armloop/tune/1"
 

@@ -106,7 +106,7 @@ def test_what_is_no_arm_is_not_taken_however_little_it_leaves() -> None:
     # none is: the best one, with its faults told
     assert taken(entry("a", 0.01, 9, BAD), entry("b", 0.02, 9, BAD)) == "a"
     # and before that the one that is nearest to an arm
-    worse = replace(BAD, driving=(0.5,))
+    worse = replace(BAD, driving=(0.5, 0.5), driving_at=(1.0, 1.0))
     assert taken(entry("a", 0.01, 9, worse), entry("b", 0.02, 9, BAD)) == "b"
 
 

@@ -127,7 +127,7 @@ class TestLibraries:
     ) -> Contender:
         library: Any = SimpleNamespace(name=f"{error} {coefficients}")
         attempt: Any = object() if of.get("tried", True) else None
-        checks: Any = SimpleNamespace(faults=lambda: [] if passed else ["no arm"])
+        checks: Any = SimpleNamespace(failed=int(not passed))
         own = np.array(blocks) if blocks is not None else None
         return Contender(
             library, attempt, "too short", (error, None), coefficients, coefficients, checks, own

@@ -180,7 +180,7 @@ class Contender:
     @property
     def faults(self) -> int:
         """How many of the checks of physics it does not pass."""
-        return len(self.checks.faults()) if self.checks is not None else 0
+        return self.checks.failed if self.checks is not None else 0
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
@@ -263,7 +263,7 @@ def comparison_notes(tried: Sequence[Contender]) -> list[str]:
         parts.append("the simplest of those that leave as little within the difference's standard error")
     notes = [f"library {taken.name}: {reason}; {', '.join(parts)}"]
     for one in others:
-        if one.checks is not None and not not one.faults and one.error < taken.error:
+        if one.checks is not None and one.faults and one.error < taken.error:
             notes.append(f"{one.name} leaves less but is no arm: {'; '.join(one.checks.faults())}")
     return notes
 
