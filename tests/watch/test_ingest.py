@@ -1,5 +1,6 @@
 """A log that is too long for memory is read in pieces, and comes to what it would come to as a whole."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -7,14 +8,15 @@ import numpy as np
 import pyarrow
 import pyarrow.parquet
 import pytest
-from operation import healthy_model, operate
+from operation import Change, healthy_model, operate
 
 from armloop.data import pieces
 from armloop.data.log import MotionLog, write_log
 from armloop.model import ReconstructedModel
 from armloop.monitoring.sums import LogSums, RestingError, log_sums
 from armloop.util.arrays import Array
-from armloop.watch import sources
+from armloop.util.errors import LogError
+from armloop.watch import ingest, sources
 from armloop.watch.ingest import _sums
 from armloop.watch.sources import LogFile
 
@@ -87,3 +89,19 @@ def test_a_piece_in_which_the_arm_rests_is_passed_over(
     resting_until(1e3)
     with pytest.raises(RestingError, match="no joint slides"):
         _sums(file, model)
+
+
+def test_a_log_recorded_in_another_unit_is_set_aside_and_a_changed_arm_is_not_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, good = healthy_model(), operate(3, 0)
+    file = LogFile(tmp_path / "log.csv", "arm", "", ("2026-01-01",))
+    write_log(file.path, replace(good, tau=1e3 * good.tau))
+    with pytest.raises(LogError, match=r"log: all torques are about 1000 times .* as if tau were in mN·m"):
+        _sums(file, model)
+    write_log(file.path, operate(3, 0, Change(mass=2.0)))
+    sums, _ = _sums(file, model)
+    assert 0.1 < sums.unexplained.max() < 0.8  # the arm itself is another, by far, and stays in the store
+    monkeypatch.setattr(ingest, "misrecorded", lambda *_: pytest.fail("asked of a log the model explains"))
+    write_log(file.path, operate(3, 0, Change(friction=np.array([0.0, 0.5, 0.0]))))
+    _sums(file, model)

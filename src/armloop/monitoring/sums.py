@@ -63,6 +63,12 @@ class LogSums:
     temperature: Array
     since_start: Array
 
+    @property
+    def unexplained(self) -> Array:
+        """(n,) residual over torque of each joint where it slides, root mean squares; 0 of one that does not."""
+        energy, torque = self.energy.sum(axis=0), self.torque.sum(axis=0)
+        return np.asarray(np.sqrt(energy / np.where(torque > 0, torque, np.inf)))
+
     @staticmethod
     def joined(parts: Sequence[LogSums]) -> LogSums:
         """Those of pieces of one log, in order (at least one), with all their blocks."""

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from armloop.data.signals import ShortRunError
+from armloop.data.log import MotionLog
+from armloop.data.signals import ShortRunError, preprocess
+from armloop.identification.validation.misrecorded import POOR, misrecorded
 from armloop.model import ReconstructedModel
 from armloop.monitoring.sums import LogSums, RestingError, log_sums
 from armloop.regression.moments import Sums
@@ -19,6 +21,8 @@ from armloop.watch.store import Store
 
 #: Logs of one arm that a worker takes at a time, in order.
 _AT_ONCE = 16
+#: Sums are of fewer samples than what was recorded wrongly is judged by: from this part of its bound on it is asked.
+_ASKED = 0.8
 #: Stands for the model of a log whose arm has none.
 _NO_MODEL = "none"
 
@@ -158,7 +162,7 @@ def _sums(file: LogFile, model: ReconstructedModel) -> tuple[LogSums, float]:
     """The sums of a log, and when it began; a long one is read in pieces, of which some may be of an arm at rest.
 
     Raises:
-        LogError: it cannot be used.
+        LogError: it cannot be used, or was recorded otherwise than the model's own (torques in another unit, say).
     """
     parts: list[LogSums] = []
     began: list[float] = []
@@ -169,6 +173,22 @@ def _sums(file: LogFile, model: ReconstructedModel) -> tuple[LogSums, float]:
             parts.append(log_sums(model, recording.log, recording.extra))
         except (RestingError, ShortRunError) as error:
             resting = resting or error
+            continue
+        _refuse_misrecorded(model, recording.log, parts[-1])
     if not parts and resting is not None:
         raise resting
     return LogSums.joined(parts), began[0]
+
+
+def _refuse_misrecorded(model: ReconstructedModel, log: MotionLog, sums: LogSums) -> None:
+    """Set a log aside that was recorded otherwise than the model's: as a change of the arm it would outshine all others.
+
+    Only of one that the model explains badly is it asked, for it takes as long as the sums.
+
+    Raises:
+        LogError: what is wrong with it, and what would be right.
+    """
+    if (sums.unexplained >= _ASKED * POOR).any() and (
+        wrong := misrecorded(model, preprocess([log], model.conditioning))
+    ):
+        raise LogError(f"{log.name}: {wrong}")

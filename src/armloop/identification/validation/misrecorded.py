@@ -27,7 +27,7 @@ from armloop.util.errors import InputError
 
 #: A joint's relative error from which on a log is asked, and the part of each joint's, at most, that what it may mean must
 #: leave of it, but for what the model leaves on its own data as well: two columns that are exchanged leave others as good.
-_POOR, _BETTER = 0.5, 0.3
+POOR, _BETTER = 0.5, 0.3
 #: Instants at which readings are compared, and how many that do best are asked of all samples.
 _SCREENED, _VERIFIED = 2000, 3
 #: A factor of all torques is far from one, or negative; one of minus one, to this ratio, is a sign.
@@ -52,7 +52,7 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
     """
     unexplained = residual(model, samples)
     left = _relative(unexplained, samples)
-    if not left.max() >= _POOR:
+    if not left.max() >= POOR:
         return ""
     usual = _usual(model, samples)
     predicted = smooth(samples, model.predict(samples.motion))
@@ -70,7 +70,7 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
             "the torques hold no weight, as where the drives compensate it themselves and report the rest: with the weight "
             "of the links added to them the model explains the log; give the whole torque, as in the model's logs"
         )
-    for j, k in combinations(np.flatnonzero(left >= _POOR), 2):
+    for j, k in combinations(np.flatnonzero(left >= POOR), 2):
         order = np.arange(len(left))
         order[[j, k]] = k, j
         swapped = replace(samples, tau=samples.tau[:, order])
@@ -111,7 +111,7 @@ def turned_joints(model: ReconstructedModel, samples: Samples) -> list[str]:
     """
     left, found = _relative(residual(model, samples), samples), []
     predicted = smooth(samples, model.predict(samples.motion))
-    for j in np.flatnonzero(left >= _POOR):
+    for j in np.flatnonzero(left >= POOR):
         moving = samples.moving[:, j]
         tau, own = samples.tau[moving, j], predicted[moving, j]
         gain = float(tau @ own / max(own @ own, TINY))
@@ -151,7 +151,7 @@ def _usual(model: ReconstructedModel, samples: Samples) -> Array:
 def _far_better(left: Array, other: Array, usual: Array) -> bool:
     """Whether what was poor is explained far better, and all else as well as the model's own data if not far better."""
     better = other <= _BETTER * left
-    return bool(better[left >= _POOR].all() and (better | (other <= usual)).all())
+    return bool(better[left >= POOR].all() and (better | (other <= usual)).all())
 
 
 def _common_gain(samples: Samples, predicted: Array) -> float:
