@@ -33,8 +33,10 @@ from armloop.diagnosis import (
     innovations,
     judgement,
     outcomes,
+    posterior,
     reversals,
     search,
+    trials,
     unlisted,
 )
 from armloop.model import load_model
@@ -107,7 +109,7 @@ RULES = [
         (contacts, "far_outside"),
     ),
     _rule(
-        "nothing is judged below the slowest trained speed",
+        "nothing is judged below half of the slowest trained speed",
         lambda model, samples: np.zeros(samples.tau.shape, dtype=bool),
         (evidence, "too_slow"),
     ),
@@ -115,7 +117,12 @@ RULES = [
     _rule("listed effects before a law", lambda self, *_: self, (account.Account, "_or_listed")),
     _rule("what is plain together alone is stated", lambda *_: False, (search, "_are_needed")),
     _rule("two at once", lambda self, found: iter(()), (search._Search, "_pairs")),
-    _rule("odds against every parameter", lambda e, effects: 0.0, (search, "log_prior")),
+    _rule(
+        "odds against every parameter",
+        lambda e, effects: 0.0,
+        (posterior, "log_prior"),
+        (trials, "log_prior"),
+    ),
     _rule(
         "more than the worst tenth of the baseline",
         lambda e, score: np.full(len(score.rows), 1e-12),

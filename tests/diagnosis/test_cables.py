@@ -327,3 +327,21 @@ def test_one_thing_that_was_found_is_no_cable_unless_one_is_beside_it(
     judged = test_it_is_taken_if_the_run_is_likelier_with_it_and_no_joint_pays
     judged((False, True, True), True, False, False, monkeypatch, several=1)
     judged((True, True), True, False, True, monkeypatch, several=1)
+
+
+@pytest.mark.parametrize("pushes", [True, False])
+def test_where_a_cable_runs_is_refined_by_the_derivatives_of_what_it_leaves(pushes: bool) -> None:
+    """Half of the postures leave the cable slack; a cable drawn to a point has no direction, and no infinite slope."""
+    arm, rng = three_axis(), np.random.default_rng(0)
+    poses = LinkPoses.of(arm, rng.uniform(-1, 1, (40, 3)))
+    weight, left = rng.uniform(0.5, 1, (40, 3)), rng.normal(size=(40, 3))
+    problem = cables._Problem(poses, weight, left, np.arange(40) // 5, 1.0)
+    x, h = np.array([0.3, 0.2, -0.5, 0.05, 0.1, 0.02, 0.0]), 1e-6
+    for link in range(3):
+        x[6] = np.median(problem._drawn(link, x, True)[1])
+        for value, slopes in ((problem._torque, problem._torque_slopes), (problem._left, problem._slopes)):
+            ends = [[value(link, x + way * h * e, pushes) for way in (1, -1)] for e in np.eye(7)]
+            numeric = np.stack([(up - down) / (2 * h) for up, down in ends], axis=2)
+            np.testing.assert_allclose(slopes(link, x, pushes), numeric, atol=1e-7)
+    at_point = np.r_[poses.p[0][0], np.zeros(3), 0.4]
+    assert np.isfinite(problem._slopes(0, at_point, pushes)).all()

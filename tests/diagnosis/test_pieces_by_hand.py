@@ -115,7 +115,8 @@ class TestTrials:
         def known(rows: Any, effects: Any, shapes: Any) -> Any:
             asked.append((rows.tolist(), [e.place for e in effects], shapes))
             trial = SimpleNamespace(shapes=["old", "new"], score="score")
-            return SimpleNamespace(fit=SimpleNamespace(effects=effects), trial=lambda effect: trial)
+            every = lambda effect, promising: None if promising and effect.place == "c" else trial  # noqa: E731
+            return SimpleNamespace(fit=SimpleNamespace(effects=effects), trial=every)
 
         monkeypatch.setattr(trials.Known, "of", staticmethod(known))
         rows = np.array([[True, False], [True, True]])
@@ -125,11 +126,14 @@ class TestTrials:
             whole=SimpleNamespace(rows=rows, only=lambda rows: rows),
         )
         packed = np.packbits(rows).tobytes()
-        first: Any = (packed, ((1, "shape"),))
-        other: Any = (packed, ())
+        first: Any = (packed, ((1, "shape"),), True)
+        other: Any = (packed, (), True)
         assert trials._tried(bench, first, 0) == ("new", "score")
         assert trials._tried(bench, first, 1) is None and len(asked) == 1  # it is there already
         assert trials._tried(bench, other, 1) == ("new", "score")
+        # what is not promising is told without another fit of what is known
+        assert trials._tried(bench, other, 2) is None
+        assert trials._tried(bench, (*other[:2], False), 2) == ("new", "score")
         assert asked == [(rows.tolist(), ["b"], ["shape"]), (rows.tolist(), [], [])]
 
 

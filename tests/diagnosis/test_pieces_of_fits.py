@@ -96,6 +96,10 @@ class TestCovariance:
         np.testing.assert_allclose(own, expected, rtol=1e-6)
 
 
+def best_shape(known: Known, effect: Any, shapes: list[float]) -> Shape:
+    return trials._best_shape(known, effect, trials._Grid.of(known, effect, shapes))
+
+
 class TestTrials:
     @pytest.mark.parametrize(
         ("of", "made"),
@@ -130,7 +134,8 @@ class TestTrials:
 
         monkeypatch.setattr(trials, "fit", fitted)
         chosen = Shape(2.0, (1.0, 2.0))
-        monkeypatch.setattr(trials, "_best_shape", lambda known, effect, shapes: chosen)
+        monkeypatch.setattr(trials, "_best_shape", lambda known, effect, grid: chosen)
+        monkeypatch.setattr(trials._Grid, "of", lambda *_: SimpleNamespace())
         rows = np.zeros((4, 2), dtype=bool)
         rows[2, 0] = True
         evidence: Any = SimpleNamespace(
@@ -221,13 +226,13 @@ class TestTrials:
             "between": lambda *_: (),
         }
         effect: Any = SimpleNamespace(indices=(1,), **linear)
-        assert trials._best_shape(known, effect, shapes) == Shape(2.0, (3.0, 2.0))
+        assert best_shape(known, effect, shapes) == Shape(2.0, (3.0, 2.0))
         effect.indices = (0,)
-        assert trials._best_shape(known, effect, shapes) == Shape(1.0, (1.0, 1.0))
+        assert best_shape(known, effect, shapes) == Shape(1.0, (1.0, 1.0))
         # what is left without a fold chooses for it
         current.outside[0] = np.concatenate([first, np.sin(t)])
         effect.indices = (1,)
-        assert trials._best_shape(known, effect, shapes) == Shape(2.0, (1.0, 2.0))
+        assert best_shape(known, effect, shapes) == Shape(2.0, (1.0, 2.0))
 
     def test_a_shape_is_chosen_with_the_coefficients_that_are_given(self) -> None:
         """The first column's is one, as of a delay's secant: minus that of the first shape would leave nothing at all."""
@@ -255,7 +260,7 @@ class TestTrials:
             between=lambda *_: (),
         )
         known = Known(evidence, np.zeros((80, 1)), current)
-        assert trials._best_shape(known, effect, [1.0, 2.0]) == Shape(2.0, (2.0, 2.0))
+        assert best_shape(known, effect, [1.0, 2.0]) == Shape(2.0, (2.0, 2.0))
 
     def test_columns_that_are_large_and_alike_are_one(self) -> None:
         """As of presliding on the log of another arm, whose torques are many times the model's noise."""
@@ -280,7 +285,7 @@ class TestTrials:
             between=lambda *_: (),
         )
         known = Known(evidence, np.zeros((80, 1)), current)
-        assert trials._best_shape(known, effect, [2.0, 1.0]) == Shape(1.0, (1.0, 1.0))
+        assert best_shape(known, effect, [2.0, 1.0]) == Shape(1.0, (1.0, 1.0))
 
     @pytest.mark.parametrize(
         ("order", "noise", "chosen"),
@@ -328,7 +333,7 @@ class TestTrials:
             ],
         )
         known = Known(evidence, np.zeros((800, 1)), current)
-        found = trials._best_shape(known, effect, [1.0, 2.0, 3.0])
+        found = best_shape(known, effect, [1.0, 2.0, 3.0])
         assert found.final == pytest.approx(chosen) and found.without == pytest.approx((chosen, chosen))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scores import score
 
-from armloop.diagnosis import outcomes
+from armloop.diagnosis import outcomes, posterior
 from armloop.diagnosis import search as searching
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import much_is_left
@@ -62,11 +62,16 @@ class TestSearch:
 
     @staticmethod
     def search(
-        monkeypatch: pytest.MonkeyPatch, left: dict[str, float], barred: tuple[str, ...] = (), **plain: float
+        monkeypatch: pytest.MonkeyPatch,
+        left: dict[str, float],
+        barred: tuple[str, ...] = (),
+        hopeless: str = "",
+        **plain: float,
     ) -> Any:
         """A search in which sets of effects, joined by blanks in the order of their names, leave so much.
 
         Args:
+            hopeless: letters of the effects that are passed over beside nothing.
             plain: how many of a run's own standard errors effects are from zero; 0 where it is not said.
         """
         every = sorted({name for names in left for name in names.split()})
@@ -76,11 +81,11 @@ class TestSearch:
             given = [x for key, x in left.items() if set(key.split()) <= set(names)]
             return score(min(given), blocks=20)
 
-        def tried(known: Any, progress: Any) -> list[Any]:
+        def tried(known: Any, progress: Any, promising: bool) -> list[Any]:
             return [
                 SimpleNamespace(effect=Named(name), shape=name.upper(), score=of([*known.names, name]))
                 for name in every
-                if name not in known.names
+                if name not in known.names and not (promising and not known.names and name[0] in hopeless)
             ]
 
         def known(evidence: Any, found: Any) -> Any:
@@ -100,7 +105,7 @@ class TestSearch:
 
         model = SimpleNamespace(arm=None, friction=FrictionLaw(((),)))
         evidence: Any = SimpleNamespace(model=model, variation=np.array([1.0]))
-        monkeypatch.setattr(searching, "hypotheses", lambda arm: ["any"] * 10)
+        monkeypatch.setattr(posterior, "hypotheses", lambda arm: ["any"] * 10)
         monkeypatch.setattr(searching, "known_with", known)
         monkeypatch.setattr(outcomes, "_nested", lambda effect, law: False)
         monkeypatch.setattr(searching.Known, "of", staticmethod(lambda evidence: known(evidence, [])))
@@ -122,6 +127,13 @@ class TestSearch:
         assert self.found(search) == ["a1", "b1"]
         search.most = 1
         assert self.found(search) == ["a1"]
+
+    @pytest.mark.parametrize("hopeless", ["", "a", "ab", "abcd"])
+    def test_two_that_are_nothing_alone_are_sought_together_whatever_is_passed_over(
+        self, hopeless: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        left = {"": 900.0, "a1": 898.0, "b1": 897.0, "c1": 899.0, "d1": 899.5, "a1 b1": 20.0}
+        assert sorted(self.found(self.search(monkeypatch, left, hopeless=hopeless))) == ["a1", "b1"]
 
     def test_a_likeliest_set_that_is_not_worth_stating_is_not_settled(
         self, monkeypatch: pytest.MonkeyPatch
@@ -158,7 +170,7 @@ class TestSearch:
 
     def test_a_posterior_is_the_likelihood_and_the_odds(self, monkeypatch: pytest.MonkeyPatch) -> None:
         search = self.search(monkeypatch, {"": 900.0, "a1": 300.0, "b2": 300.0})
-        of = searching.log_posterior
+        of = posterior.log_posterior
         scores = [score(left, blocks=20) for left in (900.0, 300.0)]
         none, one, two = (
             of(search.evidence, scores[k], [Named(name) for name in names])
@@ -166,10 +178,10 @@ class TestSearch:
         )
         # twenty blocks, what is left on top of a hundred rows, one of ten hypotheses
         assert one - none == pytest.approx(10 * np.log(1000 / 400) - np.log(10))
-        assert one - two == pytest.approx(searching.LOG_ODDS)
+        assert one - two == pytest.approx(posterior.LOG_ODDS)
         # more blocks tell no more, fewer less
-        many, few = (searching.told(score(300.0, blocks=blocks)) for blocks in (50, 10))
-        assert many == searching.told(scores[1]) == pytest.approx(2 * few)
+        many, few = (posterior.told(score(300.0, blocks=blocks)) for blocks in (50, 10))
+        assert many == posterior.told(scores[1]) == pytest.approx(2 * few)
 
     def test_effects_are_added_while_the_set_becomes_likelier(self, monkeypatch: pytest.MonkeyPatch) -> None:
         two = {"": 9000.0, "a1": 3000.0, "b1": 4000.0, "a1 b1": 100.0, "a1 b1 c1": 85.0}

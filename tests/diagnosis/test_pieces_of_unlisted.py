@@ -13,8 +13,8 @@ from synthetic import three_axis
 from armloop.data.motion import Motion
 from armloop.diagnosis import unlisted
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead_of
+from armloop.diagnosis.posterior import LOG_ODDS
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.search import LOG_ODDS
 from armloop.laws.effects import Estimate, hypotheses
 
 

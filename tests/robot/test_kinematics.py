@@ -6,7 +6,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from armloop.robot.arm import load_arm
-from armloop.robot.kinematics import nominal_parameters, regressor, tool_jacobian
+from armloop.robot.kinematics import LinkPoses, nominal_parameters, regressor, tool_jacobian
 from armloop.robot.newton_euler import joint_torques
 
 ODD_ARM = """<robot name="odd">
@@ -95,3 +95,13 @@ def test_the_far_end_of_a_last_link_without_a_tool_is_as_far_beyond_its_centre_a
     root, far = (tool_jacobian(arm, q, link) for link in (None, arm.n))
     np.testing.assert_allclose(far - root, 2 * (tool_jacobian(arm, q, arm.n - 0.5) - root), atol=1e-12)
     assert np.abs(root[..., -1]).max() < 1e-12 < np.abs(far[..., -1]).min()
+
+
+def test_torques_of_a_force_are_those_of_the_jacobian(odd_arm):
+    arm, rng = load_arm(odd_arm), np.random.default_rng(4)
+    poses = LinkPoses.of(arm, rng.uniform(-1, 1, (7, 3)))
+    for link in range(3):
+        point, force = rng.normal(size=(2, 7, 3))
+        expected = np.einsum("kfn,kf->kn", poses.jacobian(link, point), force)
+        np.testing.assert_allclose(poses.torques(link, point, force), expected, atol=1e-13)
+        assert expected[:, link].any() and not expected[:, link + 1 :].any()

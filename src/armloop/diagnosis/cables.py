@@ -24,7 +24,8 @@ from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import much_is_left
 from armloop.diagnosis.onset import posterior
 from armloop.diagnosis.outcomes import Found, Outcome
-from armloop.diagnosis.search import ROUNDS, TELLING
+from armloop.diagnosis.posterior import TELLING
+from armloop.diagnosis.search import ROUNDS
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects.elastic_cable import Cable, ElasticCable
 from armloop.model import AddedEffect
@@ -43,6 +44,8 @@ _HELD, _UNLIKELY = 1e-9, 4.0
 _ORDER = [0, 7, *range(1, 7)]
 #: The least part of what is usual by which a profile begins to move: what has no error by itself may yet bend.
 _FIRST = 1e-3
+#: Part of the reach below which a cable has no direction.
+_POINT = 1e-6
 #: Steps of a refinement, at most.
 _STEPS = 40
 #: A spring that leaves no more than this part less than a cable does not push in the run.
@@ -213,12 +216,11 @@ class _Problem:
             effect; Kish, Survey Sampling, 1965).
         """
         link, x = cable.link - 1, _numbers(cable)
-        torque, step = self._torque(link, x, cable.pushes), 1e-4 * self.reach
+        torque = self._torque(link, x, cable.pushes)
         k = self._stiffness(torque)
-        ends = [[self._torque(link, x + s * h, cable.pushes) for s in (1, -1)] for h in step * np.eye(7)]
-        slopes = [(up - down) / (2 * step) for up, down in ends]
         counts = self.weight > 0
-        X = np.stack([torque, *(k * slope for slope in slopes)], axis=2)[counts]
+        slopes = k * self._torque_slopes(link, x, cable.pushes)
+        X = np.concatenate([torque[:, :, None], slopes], axis=2)[counts]
         left = (self.y - k * torque)[counts]
         block = np.broadcast_to(self.block[:, None], counts.shape)[counts]
         prior = np.hstack([np.zeros((7, 1)), np.diag(1 / (_USUAL * self.reach))])
@@ -290,10 +292,13 @@ class _Problem:
         def left(parts: Array) -> Array:
             return np.concatenate([self._left(link, usual * parts, pushes).ravel(), parts])
 
+        def slopes(parts: Array) -> Array:
+            return np.vstack([self._slopes(link, usual * parts, pushes).reshape(-1, 7) * usual, np.eye(7)])
+
         lower, upper = np.array([*np.full(6, -np.inf), 0.0]), np.full(7, np.inf)
         if held is not None:
             lower[held], upper[held] = x[held] / usual[held] + np.array([-_HELD, _HELD])
-        found = least_squares(left, x / usual, bounds=(lower, upper), max_nfev=_STEPS)
+        found = least_squares(left, x / usual, slopes, (lower, upper), max_nfev=_STEPS)
         return self._squares(link, usual * found.x, pushes), usual * found.x
 
     def _squares(self, link: int, x: Array, pushes: bool = False) -> float:
@@ -307,14 +312,45 @@ class _Problem:
     def _stiffness(self, torque: Array) -> float:
         return max(float((torque * self.y).sum()) / max(float((torque**2).sum()), TINY), 0.0)
 
+    def _slopes(self, link: int, x: Array, pushes: bool) -> Array:
+        """(K, n, 7) derivative of what a cable leaves, with that of the stiffness that leaves least."""
+        torque, slopes = self._torque(link, x, pushes), self._torque_slopes(link, x, pushes)
+        k, squares = self._stiffness(torque), max(float((torque**2).sum()), TINY)
+        stiffer = np.einsum("kn,knm->m", self.y - 2 * k * torque, slopes) / squares if k > 0 else np.zeros(7)
+        return np.asarray(-k * slopes - torque[:, :, None] * stiffer)
+
     def _torque(self, link: int, x: Array, pushes: bool) -> Array:
         """(K, n) of a cable of unit stiffness, weighted."""
-        p = self.poses.p[link] + self.poses.R[link] @ x[3:6]
-        d = p - x[:3]
-        length = np.maximum(np.linalg.norm(d, axis=1), TINY)
+        d, _, part = self._drawn(link, x, pushes)
+        return self.poses.torques(link, x[:3] + d, part[:, None] * d) * self.weight
+
+    def _torque_slopes(self, link: int, x: Array, pushes: bool) -> Array:
+        """(K, n, 7) derivative of the same with respect to anchor, point and slack length."""
+        d, length, part = self._drawn(link, x, pushes)
+        R, p, force = self.poses.R[link], x[:3] + d, part[:, None] * d
+        taut = (part > 0) | pushes
+        moves = np.concatenate([np.broadcast_to(-np.eye(3), R.shape), R], axis=2)
+        longer = np.einsum("kf,kfm->km", d, moves) * np.where(taut, x[6] / length**3, 0.0)[:, None]
+        forces = np.concatenate(
+            [
+                part[:, None, None] * moves + d[:, :, None] * longer[:, None, :],
+                d[:, :, None] * np.where(taut, -1 / length, 0.0)[:, None, None],
+            ],
+            axis=2,
+        )
+        slopes = np.einsum("kfn,kfm->knm", self.poses.jacobian(link, p), forces)
+        # where the point moves, the same force has other lever arms, in proportion
+        torque = self.poses.torques(link, p, force)
+        for m in range(3):
+            slopes[:, :, 3 + m] += self.poses.torques(link, p + R[:, :, m], force) - torque
+        return np.asarray(slopes * self.weight[:, :, None])
+
+    def _drawn(self, link: int, x: Array, pushes: bool) -> tuple[Array, Array, Array]:
+        """From the anchor to the point (K, 3), how long that is (K,), and the force of unit stiffness as a part of it."""
+        d = self.poses.p[link] + self.poses.R[link] @ x[3:6] - x[:3]
+        length = np.maximum(np.linalg.norm(d, axis=1), _POINT * self.reach)
         stretch = length - x[6] if pushes else np.maximum(length - x[6], 0.0)
-        force = (stretch / length)[:, None] * d
-        return np.asarray(np.einsum("kfn,kf->kn", self.poses.jacobian(link, p), force) * self.weight)
+        return d, length, stretch / length
 
 
 def _numbers(cable: Cable) -> Array:

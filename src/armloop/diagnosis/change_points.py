@@ -17,8 +17,8 @@ from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.gates import Gates
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead
+from armloop.diagnosis.posterior import LOG_ODDS, TELLING, log_prior, told
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.search import LOG_ODDS, TELLING, log_prior, told
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect
 from armloop.laws.effects.encoder_offset import EncoderOffset
@@ -279,7 +279,7 @@ class ChangePoints:
         return self._of(gates.left(self._order(part), cuts, part.until, self._fixed(part)), among)
 
     def _of(self, energy: Array, among: Mask | None = None) -> Array:
-        """(T,) log likelihood of what is left of each joint (T, n), as :func:`armloop.diagnosis.search.told` has it."""
+        """(T,) log likelihood of what is left of each joint (T, n), as :func:`armloop.diagnosis.posterior.told` has it."""
         counts = self._weight > 0 if among is None else (self._weight > 0) & among[:, None]
         seen = np.array([len(np.unique(self._blocks[mine])) for mine in counts.T])
         rows = np.maximum(counts.sum(axis=0), 1)

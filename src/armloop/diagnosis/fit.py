@@ -103,8 +103,10 @@ class Fit:
         effect, free, value = self.effects[k], self.solution.free[k], self.solution.values[k]
         # most are, whatever their errors
         bare = effect.estimates(self.arm, free, np.zeros((len(free), len(free))), value)
-        possible = any(effect.possible(self.arm, own, self.had) for own in (bare, self.parameters[k]))
-        return possible and effect.resolved(bare, tried)
+        return effect.resolved(bare, tried) and (
+            effect.possible(self.arm, bare, self.had)
+            or effect.possible(self.arm, self.parameters[k], self.had)
+        )
 
     @cached_property
     def clear(self) -> tuple[float, ...]:

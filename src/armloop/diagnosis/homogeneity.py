@@ -19,7 +19,7 @@ from armloop.diagnosis.contacts import find_contacts
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import MULTIPLE, enough, leaves_more, soaked
 from armloop.diagnosis.onset import posterior
-from armloop.diagnosis.search import LOG_ODDS, told
+from armloop.diagnosis.posterior import LOG_ODDS, told
 from armloop.diagnosis.trials import Known
 from armloop.diagnosis.verdict import Diagnosis
 from armloop.laws.effects import hypotheses

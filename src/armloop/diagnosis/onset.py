@@ -21,7 +21,8 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import SIGNIFICANCE, enough, gain, is_worth, lead
 from armloop.diagnosis.outcomes import Found
-from armloop.diagnosis.search import ALTERNATIVE, MOST_EFFECTS, ROUNDS, told
+from armloop.diagnosis.posterior import ALTERNATIVE, told
+from armloop.diagnosis.search import MOST_EFFECTS, ROUNDS
 from armloop.diagnosis.trials import Known
 from armloop.diagnosis.unlisted import law_log_prior
 from armloop.laws.effects import Effect, hypotheses

@@ -14,25 +14,19 @@ import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
-from armloop.diagnosis.judgement import MOST, SIGNIFICANCE, gain, lead, log_likelihood, much_is_left
+from armloop.diagnosis.judgement import MOST, SIGNIFICANCE, gain, lead, much_is_left
 from armloop.diagnosis.lasting import much_lasts
 from armloop.diagnosis.masking import masked, stand_in
 from armloop.diagnosis.one_way import one_way
 from armloop.diagnosis.outcomes import Found, Outcome, clear, gradual, known_with, others_than, pruned
+from armloop.diagnosis.posterior import ALTERNATIVE, log_posterior
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Hypotheses, Known, Tried
-from armloop.laws.effects import Effect, hypotheses
+from armloop.laws.effects import Effect
 from armloop.laws.effects.base import Place
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress, paced
 
-#: Log prior odds against every further parameter of an effect, beside its being one of many hypotheses.
-LOG_ODDS = 1.5
-#: So many blocks of a joint tell of it at most: what a model gets wrong comes back with the motion, and more of the same
-#: motion tells no more of that.
-TELLING = 20
-#: An effect of which at least this posterior odds are left, beside the one named in its place, is its alternative.
-ALTERNATIVE = 0.05
 #: A run tells effects of so many kinds apart, or so many terms of a law, at most; a whole arm that warms up is of one kind.
 MOST_EFFECTS = 4
 #: Log posteriors that differ by less are the same: the same effects, one a little better shaped beside the others.
@@ -63,22 +57,6 @@ def search(
     return searching.of_one_cause(searching.outcome())
 
 
-def log_posterior(evidence: Evidence, score: Score, effects: Sequence[Effect]) -> float:
-    """Log posterior of a set of effects, but for a constant of the run."""
-    return log_prior(evidence, effects) + told(score)
-
-
-def told(score: Score) -> float:
-    """Log likelihood of what is left, on top of what the model leaves on its baseline, but for a constant of the run."""
-    return float(log_likelihood(score, np.maximum(score.rows, 1), TELLING).sum())
-
-
-def log_prior(evidence: Evidence, effects: Sequence[Effect]) -> float:
-    """Log prior odds of a set of effects against none."""
-    odds = np.log(len(hypotheses(evidence.model.arm)))
-    return -float(sum(odds + LOG_ODDS * (effect.complexity - 1) for effect in effects))
-
-
 class _Search:
     """One search: what could be explained at first, and what was tried beside the same effects before."""
 
@@ -95,7 +73,7 @@ class _Search:
         self.most, self.worth = min(most, MOST_EFFECTS), worth
         self.nothing = Known.of(evidence)
         self.explainable: Array = np.maximum(self.nothing.fit.score.excess, 1e-9)
-        self._beside: dict[tuple[tuple[Place, Shape], ...], tuple[Score, list[Tried]]] = {}
+        self._beside: dict[tuple[tuple[tuple[Place, Shape], ...], bool], tuple[Score, list[Tried]]] = {}
 
     def outcome(self) -> Outcome:
         """The set from which no step leads to a better one, without what is not worth it or not clear of its error."""
@@ -184,8 +162,11 @@ class _Search:
         """The same with two effects more, where much is left: what either leaves may be as large as what it removes."""
         if len(_kinds(found)) + 2 > self.most or not much_lasts(self.evidence, self._known(found).fit).any():
             return
-        more = sorted(self._additions(found), key=lambda step: -step[0])
-        for _, first in more[:_FIRST]:
+        more = list(self._additions(found))
+        if len(more) < _FIRST:
+            # either of two may be nothing without the other
+            more = list(self._additions(found, promising=False))
+        for _, first in sorted(more, key=lambda step: -step[0])[:_FIRST]:
             yield from self._additions(first)
 
     def _exchanges(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
@@ -217,19 +198,19 @@ class _Search:
         for _, first in sorted(firsts, key=lambda step: -step[0])[:_FIRST]:
             yield from self._additions(first)
 
-    def _additions(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
+    def _additions(self, found: list[Found], promising: bool = True) -> Iterator[tuple[float, list[Found]]]:
         """Sets with one effect more, with their log posteriors."""
         there = [f.effect for f in found]
-        for trial in self._asked(found)[1] if len(_kinds(found)) < self.most else []:
+        for trial in self._asked(found, promising)[1] if len(_kinds(found)) < self.most else []:
             value = log_posterior(self.evidence, trial.score, [*there, trial.effect])
             yield value, [*found, Found(trial.effect, trial.shape, 0.0)]
 
-    def _asked(self, beside: Sequence[Found]) -> tuple[Score, list[Tried]]:
-        """How these effects do, and every further one beside them; tried once."""
-        key = tuple((f.effect.place, f.shape) for f in beside)
+    def _asked(self, beside: Sequence[Found], promising: bool = True) -> tuple[Score, list[Tried]]:
+        """How these effects do, and every further one beside them that may be worth it, or every one; tried once."""
+        key = tuple((f.effect.place, f.shape) for f in beside), promising
         if key not in self._beside:
             known = self._known(beside)
-            trials = self.panel.tried(known, paced(self.progress))
+            trials = self.panel.tried(known, paced(self.progress), promising)
             self._beside[key] = known.fit.score, trials
         current, trials = self._beside[key]
         return current, [t for t in trials if t.effect.place not in self.barred]

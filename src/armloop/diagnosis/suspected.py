@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import MOST, SIGNIFICANCE, gain, lead, times_enough
 from armloop.diagnosis.outcomes import Found
-from armloop.diagnosis.search import log_posterior
+from armloop.diagnosis.posterior import log_posterior
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.util.arrays import TINY, Array

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
 from typing import Any, NamedTuple
@@ -13,16 +13,20 @@ import numpy as np
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Columns, Fit, Shape, fit
 from armloop.diagnosis.judgement import CHANCE, lead
+from armloop.diagnosis.posterior import ALTERNATIVE, log_prior, told
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, hypotheses
+from armloop.regression.embedded import ridge
 from armloop.regression.parsimony import leaves_clearly_less
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.progress import Progress
 from armloop.util.workers import Team
 
 _REFITS = 8
 #: Parameters that change by less than this part of their standard errors are the same.
 _SAME = 0.1
+#: Log odds of what is neither worth a step nor an alternative, and stays so where a nonlinear parameter is not quite known.
+_HOPELESS = np.log(ALTERNATIVE) - 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,20 +67,58 @@ class Known:
         errors = np.hstack([e.std_error for p in other.fit.parameters for e in p.values()])
         return bool((np.abs(mine - others) <= _SAME * errors)[np.isfinite(errors)].all())
 
-    def trial(self, effect: Effect) -> Fit | None:
-        """All effects fitted with one more; None where it cannot be there or shows nothing on this run."""
+    def trial(self, effect: Effect, promising: bool = False) -> Fit | None:
+        """All effects fitted with one more; None where it cannot be there or shows nothing on this run.
+
+        Args:
+            promising: None as well where its columns show already that it is no part, nor an alternative to a part, of a
+                likelier set.
+        """
         evidence, current = self.evidence, self.fit
         if not all(evidence.rows[:, j].any() for j in effect.indices):
             return None  # a joint at rest shows nothing
         shapes = evidence.tried(effect)
         if not shapes:
             return None
-        one = len(shapes) == 1
-        shape = Shape.fixed(shapes[0]) if one else _best_shape(self, effect, shapes)
+        grid = _Grid.of(self, effect, shapes) if len(shapes) > 1 else None
+        if promising and self._at_most(effect, grid.first(self, effect) if grid else shapes[0]) < _HOPELESS:
+            return None
+        shape = _best_shape(self, effect, grid) if grid else Shape.fixed(shapes[0])
         effects, chosen = [*current.effects, effect], [*current.shapes, shape]
         trial = fit(evidence, self.residual, effects, chosen, self._columns)
         # What is known may be nothing beside it, and of either sign: it is asked again beside this one.
         return trial if trial.is_possible(-1, shapes) else None
+
+    def _at_most(self, effect: Effect, shape: float) -> float:
+        """Upper bound of the log posterior odds of an effect beside what is known (branch and bound).
+
+        Least squares without constraints on the rows themselves leave no more than what was fitted without the rows that it
+        is judged by: of these a fit leaves (I - H)^-1 times as much, H their part of the hat matrix. Joints that no effect
+        ties to its own are left as they are.
+        """
+        Q, left = self._outside
+        Z = self.evidence.weighted(effect, shape)
+        Z = Z - Q @ (Q.T @ Z)
+        least = left - Z @ ridge(Z.T @ Z, Z.T @ left)
+        rows, current = self.fit.stacked, self.fit.score
+        bound = Score.of(current.complexity, least, rows.joint, rows.block, rows.joints)
+        errors = np.where(self._tied(effect)[:, None], bound.errors, current.errors)
+        return told(replace(current, errors=errors)) - told(current) + log_prior(self.evidence, [effect])
+
+    def _tied(self, effect: Effect) -> Mask:
+        """(n,) joints whose torque an effect changes, or what is known does once it is fitted beside it."""
+        n = self.fit.stacked.joints
+        each = [np.isin(np.arange(n), e.indices) | (not e.indices) for e in (effect, *self.fit.effects)]
+        tied = each[0]
+        for _ in each[1:]:
+            tied = np.any([tied, *(own for own in each if (own & tied).any())], axis=0)
+        return tied
+
+    @cached_property
+    def _outside(self) -> tuple[Array, Array]:
+        """Orthonormal basis (R, p) of the columns of what is known, and what they leave of the rows (R,) at least."""
+        Q = np.linalg.qr(self.fit.stacked.X)[0]
+        return Q, self.fit.stacked.y - Q @ (Q.T @ self.fit.stacked.y)
 
 
 class Tried(NamedTuple):
@@ -87,8 +129,9 @@ class Tried(NamedTuple):
     score: Score
 
 
-#: Samples that count, packed, and the effects that are known: their number in the list of hypotheses, and shapes.
-_Task = tuple[bytes, tuple[tuple[int, Shape], ...]]
+#: Samples that count, packed, the effects that are known (their number in the list of hypotheses, and shapes), and
+#: whether only what is promising is tried.
+_Task = tuple[bytes, tuple[tuple[int, Shape], ...], bool]
 
 
 class Hypotheses:
@@ -114,10 +157,15 @@ class Hypotheses:
     def __exit__(self, *raised: Any) -> None:
         self._team.__exit__(*raised)
 
-    def tried(self, known: Known, tell: Progress) -> list[Tried]:
-        """Trials of all further effects that can be there; of the same samples and effects they are tried once."""
+    def tried(self, known: Known, tell: Progress, promising: bool = True) -> list[Tried]:
+        """Trials of all further effects that can be there; of the same samples and effects they are tried once.
+
+        Args:
+            promising: only of those that may be worth it, or an alternative to what is.
+        """
         numbers = (self._number[effect.place] for effect in known.fit.effects)
-        task = np.packbits(known.evidence.rows).tobytes(), tuple(zip(numbers, known.fit.shapes, strict=True))
+        there = tuple(zip(numbers, known.fit.shapes, strict=True))
+        task = np.packbits(known.evidence.rows).tobytes(), there, promising
         if task in self._answers:
             return self._answers[task]
         self._bench.task, self._bench.known = task, known
@@ -144,27 +192,27 @@ class _Bench:
 
 def _tried(bench: _Bench, task: _Task, k: int) -> tuple[Shape, Score] | None:
     """The trial of a hypothesis beside others; what is known is fitted by every process for itself."""
-    if bench.task != task:
-        packed, found = task
+    packed, found, promising = task
+    if bench.task is None or bench.task[:2] != task[:2]:
         rows = np.unpackbits(np.frombuffer(packed, np.uint8), count=bench.whole.rows.size).astype(bool)
         evidence = bench.whole.only(rows.reshape(bench.whole.rows.shape))
         effects, shapes = [bench.listed[number] for number, _ in found], [shape for _, shape in found]
         bench.known, bench.task = Known.of(evidence, effects, shapes), task
     effect = bench.listed[k]
     taken = {known.place for known in bench.known.fit.effects}
-    trial = None if effect.place in taken else bench.known.trial(effect)
+    trial = None if effect.place in taken else bench.known.trial(effect, promising)
     return None if trial is None else (trial.shapes[-1], trial.score)
 
 
-def _best_shape(known: Known, effect: Effect, shapes: Sequence[float]) -> Shape:
+def _best_shape(known: Known, effect: Effect, grid: _Grid) -> Shape:
     """The shape whose columns explain most of what the known effects leave on the effect's joints.
 
     Chosen on all blocks for the parameters, and without each fold in turn for judging that fold: on the other
     blocks, and on what the known effects leave there when they, too, are fitted without that fold. What lies between
     (:meth:`Effect.between`) takes the place of the best where it is clearly better.
     """
-    grid, folds = _Grid.of(known, effect, shapes), (None, *range(FOLDS))
-    chosen = [shapes[int(np.argmin(grid.remaining(without)))] for without in folds]
+    folds = (None, *range(FOLDS))
+    chosen = [grid.best(without) for without in folds]
     around = {shape: list(effect.between(known.evidence.context, shape)) for shape in set(chosen)}
     if any(around.values()):
         finer = _Grid.of(known, effect, sorted({*around, *chain(*around.values())}))
@@ -198,6 +246,16 @@ class _Grid:
         # Columns of which coefficients are given, as a delay's are, are no columns to be fitted.
         given, free = effect.embed(effect.start(np.zeros(columns.shape[2])))
         return _Grid(shapes, columns @ free, columns @ given, np.vstack([held_out, outside]), fold)
+
+    def best(self, without: int | None) -> float:
+        """The one that leaves least, of all rows or of those outside a fold."""
+        return self.shapes[int(np.argmin(self.remaining(without)))]
+
+    def first(self, known: Known, effect: Effect) -> float:
+        """The one that leaves least of all rows, what lies around the best (:meth:`Effect.between`) included."""
+        best = self.best(None)
+        around = effect.between(known.evidence.context, best)
+        return _Grid.of(known, effect, [best, *around]).best(None) if len(around) else best
 
     @cached_property
     def _grams(self) -> list[Array]:

@@ -38,9 +38,9 @@ from armloop.diagnosis.law_selection import (
     names_of,
 )
 from armloop.diagnosis.outcomes import Found, Outcome, pruned, refitted, with_effects, without_effects_at
+from armloop.diagnosis.posterior import log_prior, told
 from armloop.diagnosis.reasons import part_of_a_law
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.search import log_prior, told
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law, hypotheses
 from armloop.laws.effects.found import RANGE
