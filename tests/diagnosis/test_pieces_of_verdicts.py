@@ -126,8 +126,8 @@ class TestReasons:
         model: Any = SimpleNamespace(arm=arm, history={"slowest": [0.0471, 0.3, 0.02]})
         assert reasons._slow(model, np.array([0.02, 0.0, 0.0])) == []
         assert reasons._slow(model, np.array([0.03, 0.0, 0.25])) == [
-            "samples in which a joint slides slower than it was trained at, which were not judged: 3% of joint 1's "
-            "(0.047 rad/s), 25% of joint 3's (0.02 m/s)"
+            "samples in which a joint slides slower than half of what it was trained at, which were not judged: 3% of "
+            "joint 1's (below 0.024 rad/s), 25% of joint 3's (below 0.01 m/s)"
         ]
 
     def test_a_residual_is_real_if_it_can_be_foretold_or_nothing_is_known_of_it(self) -> None:
@@ -318,7 +318,7 @@ class TestReasons:
             (none, none, none, "joint 1 does not slide in this run"),
             (every, ~none, none, "joint 1 slides only beyond 1.2 times the range"),
             (every, first, none, "joint 1 slides only beyond 1.2 times the range"),
-            (every, none, first, "joint 1 slides only slower than it was trained at, or"),
+            (every, none, first, "joint 1 slides only slower than half of what it was trained at, or"),
             (every, none, none, "joint 1 slides only within events"),
         ):
             assert reasons._uncounted(0, slides, strays, creeps).startswith(words)

@@ -105,5 +105,6 @@ def test_what_is_left_of_motion_slower_than_in_training_is_told_apart(slow_error
     assert [words.split(":")[0] for words in found] == (["joint 1"] if told else [])
     if told:
         assert found[0].startswith(
-            "joint 1: 65% of the torque, but 20% without samples slower than it slid in training (0.1 rad/s)"
+            "joint 1: 65% of the torque, but 20% without samples slower than half of what it slid at in training (below "
+            "0.05 rad/s)"
         )

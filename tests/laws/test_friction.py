@@ -118,6 +118,19 @@ def test_levels_add_up_once_the_joint_slides(others: list[FrictionTerm], static:
     assert fast == pytest.approx(sums["coulomb"] + 5.0 * sums["viscous"], abs=1e-9)
 
 
+@pytest.mark.parametrize("level", ["sign", "hysteresis"])
+def test_the_viscous_friction_of_a_joint_is_the_mean_of_both_directions(level: str) -> None:
+    """By Eq. (34) where the dry friction has that form, and once the joint slides where it has not."""
+    either = FrictionTerm("viscous_forward", 0.6), FrictionTerm("viscous_backward", 0.2)
+    law = FrictionLaw(((FrictionTerm(level, 0.5, 0.01), FrictionTerm("viscous", FV), *either),))
+    sums = law.stribeck_sums(0) or law.sliding_sums(0)
+    mean = sum(t.share * t.coefficient for t in sums["viscous"])
+    ways = law.torque(at_speeds([2.0, 2.0, 2.0]))[-1, 0] - law.torque(at_speeds([-2.0, -2.0, -2.0]))[-1, 0]
+    assert mean == pytest.approx(FV + 0.4) == pytest.approx((ways - 2 * 0.5) / (2 * 2.0))
+    if level == "sign":
+        assert law.stribeck_parameters(0)["viscous"] == mean
+
+
 def test_the_direction_is_there_as_soon_as_its_fastest_part() -> None:
     sharp, memory = [FrictionTerm("sign", 0.1)], [FrictionTerm("hysteresis", 0.1, 0.01)]
     others = [FrictionTerm("stribeck_peak", 0.3, 0.001), FrictionTerm("viscous", FV)]

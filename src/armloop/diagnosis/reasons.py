@@ -29,7 +29,7 @@ from armloop.identification.goodness import (
     parts_of,
     witness,
 )
-from armloop.identification.scoring import too_slow
+from armloop.identification.scoring import known_from, too_slow
 from armloop.identification.shared_motors import sharing
 from armloop.identification.uncertainty import usual_in_words
 from armloop.laws.effects import Effect
@@ -342,7 +342,7 @@ def _uncounted(
     if (slides & ~strays).sum() < _FEWEST:
         where = f"beyond {FAR:g} times the range the model was trained on"
     elif (slides & ~strays & ~creeps).sum() < _FEWEST:
-        where = f"slower than it was trained at, or beyond {FAR:g} times the range"
+        where = f"slower than half of what it was trained at, or beyond {FAR:g} times the range"
     elif few:
         counts = int((slides & ~strays & ~creeps).sum())
         return (
@@ -370,15 +370,17 @@ def _outside(outside: Array, far: Array) -> list[str]:
 
 
 def _slow(model: ReconstructedModel, slow: Array) -> list[str]:
-    """A sentence on the joints that slide slower than in training in a part (n,) of the samples that they move in."""
+    """A sentence on the joints that slide too slowly to be judged in a part (n,) of the samples that they move in."""
+    speeds = known_from(model)
     said = [
-        f"{slow[j]:.0%} of joint {j + 1}'s ({model.history['slowest'][j]:.2g} {'rad/s' if model.arm.revolute[j] else 'm/s'})"
+        f"{slow[j]:.0%} of joint {j + 1}'s (below {speeds[j]:.2g} {'rad/s' if model.arm.revolute[j] else 'm/s'})"
         for j in np.flatnonzero(slow > WORTH_A_WORD)
     ]
     if not said:
         return []
     return [
-        f"samples in which a joint slides slower than it was trained at, which were not judged: {', '.join(said)}"
+        "samples in which a joint slides slower than half of what it was trained at, which were not judged: "
+        f"{', '.join(said)}"
     ]
 
 

@@ -76,6 +76,7 @@ class Element:
         by_load: whether it grows with the torque that passes the joint, abs(load).
         called: what a user calls the friction law that it belongs to, if the selection has it.
         steep: whether it is infinitely steep at rest but for ``parameter``, rad/s (m/s), below which it is rounded off.
+        one_way: whether it acts in one direction of sliding alone.
     """
 
     value: Callable[[Sliding, float, Functions], Any]
@@ -86,6 +87,7 @@ class Element:
     part: str = "friction"
     called: tuple[str, ...] = ()
     steep: bool = False
+    one_way: bool = False
 
     @property
     def of_time(self) -> bool:
@@ -160,10 +162,18 @@ KINDS: dict[str, Element] = {
     "quadratic": Element(lambda x, p, f: abs(x.v) * x.v, "abs(v{j})*v{j}", 2, called=("nonlinear_viscous",)),
     "cubic": Element(lambda x, p, f: x.v * x.v * x.v, "v{j}^3", 2, called=("nonlinear_viscous",)),
     "viscous_forward": Element(
-        lambda x, p, f: 0.5 * (x.v + abs(x.v)), "max(v{j},0)", 2, called=("viscous_by_direction",)
+        lambda x, p, f: 0.5 * (x.v + abs(x.v)),
+        "max(v{j},0)",
+        2,
+        called=("viscous_by_direction",),
+        one_way=True,
     ),
     "viscous_backward": Element(
-        lambda x, p, f: 0.5 * (x.v - abs(x.v)), "min(v{j},0)", 2, called=("viscous_by_direction",)
+        lambda x, p, f: 0.5 * (x.v - abs(x.v)),
+        "min(v{j},0)",
+        2,
+        called=("viscous_by_direction",),
+        one_way=True,
     ),
     "load_smooth_sign": Element(
         _direction, "abs(load{j})*tanh(v{j}/{p:g})", 1, "fading", True, called=("coulomb_by_load",)
@@ -182,6 +192,8 @@ KINDS: dict[str, Element] = {
 }
 #: Eq. (34) by kinds of elements: a level, and a rise from it (the level is f_s) or a fall onto it (the level is f_c).
 _EQUATION_34 = ("sign", "smooth_sign"), ("stribeck",), ("stribeck_peak",)
+#: Viscous friction, of both directions and of either.
+_VISCOUS = ("viscous", "viscous_forward", "viscous_backward")
 #: A direction that fades in as tanh(v/p) is all there from this many p on, to half a percent.
 FADED = 3.0
 #: What a user calls the friction laws of the selection, and the kinds of elements that each consists of. Of the directions
@@ -272,6 +284,11 @@ class FrictionTerm:
         return self.element.pattern.format(j=joint, p=self.parameter)
 
     @property
+    def share(self) -> float:
+        """Part of its coefficient that acts in the mean of both directions of sliding."""
+        return 0.5 if self.element.one_way else 1.0
+
+    @property
     def by_load(self) -> bool:
         """Whether it is proportional to the torque that passes the joint."""
         return self.element.by_load
@@ -293,6 +310,13 @@ class FrictionTerm:
         if self.by_load and load is None:
             raise ModelError(f"friction term {self.kind!r} needs the load torque")
         return column(self.element, motion, Direction(joint), self.parameter, load, sign)
+
+
+def without_spanned(law: Sequence[FrictionTerm]) -> list[int]:
+    """Places of a law's terms without viscous friction where both directions have their own, of which it is the sum."""
+    kinds = {term.kind for term in law}
+    spanned = set(_VISCOUS) <= kinds
+    return [k for k, term in enumerate(law) if not (spanned and term.kind == _VISCOUS[0])]
 
 
 def stribeck_term(law: Iterable[FrictionTerm]) -> FrictionTerm | None:
@@ -334,8 +358,9 @@ class FrictionLaw:
         return min((t.parameter for t in dry if t.element.way == "fading"), default=0.0)
 
     def stribeck_sums(self, joint: int) -> dict[str, list[FrictionTerm]]:
-        """f_s, f_c, f_v of Eq. (34) for a joint (0-based), each by the terms whose coefficients add up to it.
+        """f_s, f_c, f_v of Eq. (34) for a joint (0-based), each by the terms whose shares of coefficients add up to it.
 
+        Viscous friction that differs by direction has the mean of both as f_v.
         Empty where the dry friction has another form: of several levels, with falls at several velocities, with memory, or
         with a level that is not yet all there where the fall ends.
         """
@@ -347,14 +372,15 @@ class FrictionLaw:
             return {}
         if fades and not (fall and fall[0].parameter > FADED * level[0].parameter):
             return {}
-        viscous = [t for t in terms if t.kind == "viscous"]
+        viscous = [t for t in terms if t.kind in _VISCOUS]
         sums = {"static": level + fall, "coulomb": level + rise}
         return {**sums, "viscous": viscous} if viscous else sums
 
     def stribeck_parameters(self, joint: int) -> dict[str, float]:
         """f_s, f_c, f_v, v_s of Eq. (34) for a joint (0-based), where the law has that form."""
         values = {
-            key: sum(term.coefficient for term in terms) for key, terms in self.stribeck_sums(joint).items()
+            key: sum(term.share * term.coefficient for term in terms)
+            for key, terms in self.stribeck_sums(joint).items()
         }
         fall = stribeck_term(self.terms[joint])
         return {**values, "stribeck_velocity": fall.parameter} if values and fall else values
@@ -372,7 +398,7 @@ class FrictionLaw:
         rises = [t for t in levels if t.kind in _EQUATION_34[1]]
         if not levels or any("nonlinear_viscous" in t.element.called for t in terms):
             return {}
-        viscous = [t for t in terms if t.kind == "viscous"]
+        viscous = [t for t in terms if t.kind in _VISCOUS]
         sums = {"coulomb": levels, **({"viscous": viscous} if viscous else {})}
         fall = stribeck_term(terms)
         if fall is None:

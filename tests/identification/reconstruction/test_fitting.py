@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import partial
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -141,3 +143,30 @@ def test_rows_beside_which_laws_are_tried_with_one_that_was_found(training: Trai
     np.testing.assert_allclose(
         bench._rows.weight, np.sqrt(alone.solve(alone.everything, PRIOR).weights)[joint], rtol=1e-9
     )
+
+
+def test_laws_that_cannot_be_with_all_data_are_left_out(
+    training: Training, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two springs the first pushes away from its rest once all data are fitted: no file could be read that holds it."""
+    springs = [e for e in hypotheses(ARM) if e.name == "joint_spring" and e.joint in (1, 2)]
+    laws = Laws([Law(spring, 0.0, 2) for spring in springs], tried=7)
+    ours = Fitting(ARM, training, DESIGN, {}, training.options, print)
+
+    def bench(selection: Any) -> Any:
+        return lambda laws: SimpleNamespace(
+            trial=lambda columns: SimpleNamespace(covariance=np.eye(columns.shape[2]))
+        )
+
+    def selection(*coefficients: float) -> Any:
+        theta = np.concatenate([np.full(BASE.count, 9.0), coefficients, [5.0]])
+        return SimpleNamespace(solved=lambda held_out: SimpleNamespace(theta=theta if held_out else None))
+
+    again = selection(2.0, 0.2)
+    monkeypatch.setattr(ours, "_bench", bench)
+    monkeypatch.setattr(ours, "_beside", lambda laws, before: again)
+    chosen, left = ours._possible(selection(-1.0, 0.1, 2.0, 0.2), laws)
+    assert chosen is again and [law.effect for law in left.chosen] == springs[1:] and left.tried == 7
+    assert ours.covariance.shape == (2, 2)
+    both = selection(1.0, 0.1, 2.0, 0.2)
+    assert ours._possible(both, laws) == (both, laws) and ours.covariance.shape == (4, 4)

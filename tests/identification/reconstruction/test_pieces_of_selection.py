@@ -44,10 +44,14 @@ def laws(*elements: int) -> list[Any]:
     ]
 
 
+#: Candidates of two joints, by their places.
+_ALIKE = [[FrictionTerm("viscous")] * 4] * 2
+
+
 def state(errors: dict[str, Any], taken: list[list[int]] | None = None, **of: Any) -> Any:
     errors = {"- -": 4.0, **errors}
     table: Any = Table(errors, **{k: v for k, v in of.items() if k == "counts"})
-    found = selection._State(table, laws(1, 1, 1), [[], []], of.get("priors", {}))
+    found = selection._State(table, laws(1, 1, 1), _ALIKE, of.get("priors", {}))
     if taken is not None:
         found.taken = taken
         found._weights, found._errors = found._judged()
@@ -67,7 +71,7 @@ class TestLadder:
     def test_they_are_relative_to_its_squares_whatever_its_samples(self) -> None:
         one = state({}, counts=((10.0, 1.0), (10.0, 1.0), (5.0, 0.0)))
         one.pooled.squares = np.array([[40.0, 9.0], [40.0, 9.0], [20.0, 18.0]])
-        again = selection._State(one.pooled, laws(1), [[], []], {})
+        again = selection._State(one.pooled, laws(1), _ALIKE, {})
         assert again._error(np.array([[4.0, 1.0], [4.0, 4.0], [1.0, 4.0]])) == pytest.approx(
             0.5 * (np.sqrt(9 / 100) + np.sqrt(9 / 36))
         )
@@ -250,13 +254,21 @@ class TestLadder:
         for choice, error in (("01", 4 * np.exp(0.001)), ("0", 4 * np.exp(both)), ("1", 9.0), ("-", 9.0)):
             table.errors[f"{choice} 3"] = [[error, 4.0]] * 2
             table.errors[f"{choice} -"] = [[error, 9.0]] * 2
-        one = selection._State(table, laws(2, 1, 1), [[], []], {})
+        one = selection._State(table, laws(2, 1, 1), _ALIKE, {})
         one.taken = [[0, 1], [2]]
         one._weights, one._errors = one._judged()
         one.drop_elements()
         took = one.comparisons[-1]
         assert one.choice(one.taken) == [kept, [3]] and took.joints == [0]
         assert took.rung == "elements dropped" and took.after == one._error(one._errors)
+
+    def test_of_both_directions_and_their_sum_the_sum_is_left_out(self) -> None:
+        one = state({})
+        kinds = ("viscous", "viscous_forward", "viscous_backward")
+        one.candidates = [[FrictionTerm(kind) for kind in kinds]] * 2
+        assert one.choice([[0, 1, 2], [0, 2]]) == [[1, 2], [0, 2]]
+        one._dropped[0].add(2)
+        assert one.choice([[0, 1, 2], [0, 2]]) == [[0, 1], [0, 2]]
 
     def test_elements_follow_the_speeds(self) -> None:
         motion = fourier_motion(5.0, 100.0, 1)

@@ -97,7 +97,7 @@ def test_a_baseline_is_of_motion_as_fast_as_the_model_knows(monkeypatch: pytest.
     monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
     speed = np.random.default_rng(5).uniform(0.0, 1.0, (N, 2))
     monkeypatch.setattr(scoring, "held_speed", lambda samples: speed)
-    model: Any = SimpleNamespace(history={"slowest": [0.5, 0.0]})
+    model: Any = SimpleNamespace(history={"slowest": [1.0, 0.0]})
     found, whole = Tally.of(chunk(1.0), model, None), Tally.of(chunk(1.0), NOBODY, None)
     held = (BLOCKS % 5 == 0)[:, None]
     slid = MOVING & held & (speed >= [0.5, 0.0])

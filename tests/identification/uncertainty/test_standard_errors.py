@@ -250,9 +250,10 @@ class TestWhatIsNotDetermined:
         return standard.Errors(unknowns, np.diag([4.0, 1.0, 9.0]), np.ones(3), equations)
 
     def test_the_friction_stays_and_the_sum_has_a_standard_error(self) -> None:
-        (entry,) = self.errors().undetermined()
-        assert entry["joint"] is None and entry["coefficients"] == ["mass"]
-        (told,) = entry["sums"]
+        entry, mine = self.errors().undetermined()
+        assert (entry["joint"], entry["coefficients"], entry["sums"]) == (None, ["mass"], [])
+        assert (mine["joint"], mine["coefficients"]) == (2, [])
+        (told,) = mine["sums"]
         assert told["sum"] == "viscous + 2 mass"
         assert told["value"] == pytest.approx(7 + 2 * 3) and told["std_error"] == pytest.approx(
             np.sqrt(9 + 4 * 4)
@@ -273,6 +274,21 @@ class TestWhatIsNotDetermined:
         assert errors.undetermined()[0]["joint"] == 2
         errors.covariance[:] = -1e-20
         assert errors.undetermined()[0]["sums"][0]["std_error"] == 0.0
+
+    def test_what_is_lost_is_told_joint_by_joint(self) -> None:
+        """Of a regression of several joints, each of whose friction holds a column twice."""
+        X = np.random.default_rng(0).normal(size=(30, 5))
+        X[:, 2], X[:, 4] = X[:, 1], 3 * X[:, 3]
+        unknowns = [
+            unknown("mass", None, 3.0, "shared"),
+            *(unknown(f"{name}{j + 1}", j, float(j + 1)) for j in range(2) for name in ("a", "b")),
+        ]
+        equations: Any = SimpleNamespace(jacobian=(X.T @ X)[None], stage=np.zeros(5, dtype=int))
+        told = standard.Errors(unknowns, np.eye(5), np.ones(5), equations).undetermined()
+        assert [(one["joint"], one["coefficients"], [s["sum"] for s in one["sums"]]) for one in told] == [
+            (1, ["b1"], ["a1 + b1"]),
+            (2, ["b2"], ["a2 + 3 b2"]),
+        ]
 
 
 def test_levels_of_stribeck_friction_are_sums_with_the_fewest_degrees_of_freedom() -> None:
@@ -299,6 +315,15 @@ def test_levels_of_stribeck_friction_are_sums_with_the_fewest_degrees_of_freedom
     errors = {key: e["std_error"] for key, e in found.items()}
     assert errors == pytest.approx({"static": 2.0, "coulomb": 3.0, "stribeck_velocity": 5.0, "viscous": 4.0})
     assert standard._stribeck(model, [part], 0) == {}
+    # of viscous friction of either direction the mean, with their covariance
+    ways = (FrictionTerm("viscous_forward", 3.0), FrictionTerm("viscous_backward", 1.0))
+    both = FrictionLaw(((), (terms[0], *ways)))
+    unknowns = [unknown(term.name(2), 1) for term in both.terms[1]]
+    covariance = np.array([[1.0, 0.0, 0.0], [0.0, 4.0, 2.0], [0.0, 2.0, 9.0]])
+    part = standard.Errors(unknowns, covariance, np.array([30.0, 20.0, 40.0]), nothing)
+    viscous = standard._stribeck(SimpleNamespace(friction=both), [part], 1)["viscous"]  # type: ignore[arg-type]
+    assert (viscous["value"], viscous["degrees_of_freedom"]) == (2.0, 20.0)
+    assert viscous["std_error"] == pytest.approx(np.sqrt((4 + 9 + 2 * 2) / 4))
 
 
 def test_a_model_keeps_errors_where_they_belong_and_none_that_is_no_number(

@@ -33,7 +33,7 @@ from armloop.laws.effects.base import entry, fill, std_errors
 from armloop.laws.effects.found import RANGE
 from armloop.laws.effects.payload import reach
 from armloop.laws.friction import KINDS
-from armloop.robot.arm import load_arm
+from armloop.robot.arm import Arm, load_arm
 from armloop.util.errors import InputError, ModelError
 
 SCARA = load_arm("scara")  # joint 3 slides
@@ -198,14 +198,20 @@ def test_an_encoder_may_be_off_by_a_radian() -> None:
     assert_allclose(torque, np.outer((q[:, 1] - 1) ** 2 - q[:, 1] ** 2, [0, 1, 0]), atol=1e-15)
 
 
-def test_a_springs_rest_is_within_a_turn_or_two_metres() -> None:
-    def possible(joint: int, rest: float) -> bool:
+def test_a_springs_rest_is_within_a_turn_or_twice_the_travel() -> None:
+    def possible(joint: int, rest: float, arm: Arm = SCARA) -> bool:
         found = {"stiffness": Estimate(1.0, 0.0, ""), "rest": Estimate(rest, 0.0, "")}
-        return effect("joint_spring", joint).plausible(SCARA, found)
+        return effect("joint_spring", joint).plausible(arm, found)
 
     for joint in (1, 2, 4):
         assert possible(joint, -6.28) and not possible(joint, 6.29)
-    assert possible(3, -1.99) and not possible(3, 2.01)
+    slide = SCARA.joints[2]
+    travel = slide.upper - slide.lower
+    for end, beyond in ((slide.lower, -travel), (slide.upper, travel)):
+        assert possible(3, end + 0.99 * beyond) and not possible(3, end + 1.01 * beyond)
+    endless = replace(slide, lower=-np.inf)
+    arm = replace(SCARA, joints=(*SCARA.joints[:2], endless, *SCARA.joints[3:]))
+    assert possible(3, -9.9, arm) and not possible(3, 10.1, arm)
 
 
 @pytest.mark.parametrize(("periods", "shown"), [(0.1, 1.0), (0.3, 1.0), (0.45, 0.5), (0.6, 0.0), (1.0, 0.0)])

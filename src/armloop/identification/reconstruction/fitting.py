@@ -70,11 +70,21 @@ class Fitting:
             finer = reshaped(laws, self._bench(selection), self._arm, samples)
             if [law.shape for law in finer.chosen] != [law.shape for law in laws.chosen]:
                 laws, selection = finer, self._beside(finer, selection)
-            trial = self._bench(selection)([]).trial(laws.columns(self._arm, samples))
-            assert trial is not None
-            self.covariance = trial.covariance
         elif self._design.laws.chosen:
             selection = self._beside(laws, selection)
+        return self._possible(selection, laws)
+
+    def _possible(self, selection: FrictionSelection, laws: Laws) -> tuple[FrictionSelection, Laws]:
+        """The same without laws that no arm has with the coefficients that all of the data give them."""
+        while laws.chosen:
+            trial = self._bench(selection)([]).trial(laws.columns(self._arm, self._training.window.samples))
+            assert trial is not None
+            self.covariance = trial.covariance
+            theta = selection.solved(held_out=True).theta[self._own.count :][: laws.count]
+            fewer = laws.possible(self._arm, theta, self.covariance)
+            if len(fewer.chosen) == len(laws.chosen):
+                break
+            laws, selection = fewer, self._beside(fewer, selection)
         return selection, laws
 
     def _beside(self, laws: Laws, selection: FrictionSelection) -> FrictionSelection:

@@ -33,7 +33,7 @@ from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.pooled import Choice, Pooled, Prior, Solution
 from armloop.identification.reconstruction.stribeck_speed import stribeck_speeds
 from armloop.identification.reconstruction.training import Training
-from armloop.laws.friction import FRICTION_LAWS, FrictionTerm
+from armloop.laws.friction import FRICTION_LAWS, FrictionTerm, without_spanned
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array
 from armloop.util.errors import InputError
@@ -283,10 +283,14 @@ class _State:
         self._weights, self._errors = self._judged()
 
     def choice(self, taken: list[list[int]]) -> Choice:
-        """Places of the elements of some extensions per joint, without those that were dropped."""
-        return [
+        """Places of the elements of some extensions per joint, without those that were dropped or others span."""
+        chosen = [
             [place for level in own for place in self._places[level] if place not in dropped]
             for own, dropped in zip(taken, self._dropped, strict=True)
+        ]
+        return [
+            [places[k] for k in without_spanned([own[place] for place in places])]
+            for own, places in zip(self.candidates, chosen, strict=True)
         ]
 
     def laws(self, taken: list[list[int]]) -> list[list[FrictionTerm]]:

@@ -93,11 +93,11 @@ class Errors:
         values = np.array([self.unknowns[k].value for k in order])
         covariance = self.covariance[np.ix_(order, order)]
         mixed = [(int(k), row) for k, row in zip(kept, sums, strict=True) if np.count_nonzero(row) > 1]
-        joint = self.unknowns[order[lost[0]]].joint
+        joints = [self.unknowns[k].joint for k in order]
         return [
             {
                 "joint": None if joint is None else joint + 1,
-                "coefficients": [names[k] for k in lost],
+                "coefficients": [names[k] for k in lost if joints[k] == joint],
                 "sums": [
                     {
                         "sum": combination(row, names, k),
@@ -105,8 +105,10 @@ class Errors:
                         "std_error": float(np.sqrt(max(row @ covariance @ row, 0.0))),
                     }
                     for k, row in mixed
+                    if joints[k] == joint
                 ],
             }
+            for joint in dict.fromkeys(joints[k] for k in [*lost, *(k for k, _ in mixed)])
         ]
 
 
@@ -351,17 +353,16 @@ def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) ->
     """f_s, f_c, f_v, v_s of a joint, of Eq. (34) or else once it slides: sums of coefficients, with standard errors."""
     law = model.friction
     sums = law.stribeck_sums(joint) or law.sliding_sums(joint)
-    values = {key: sum(term.coefficient for term in terms) for key, terms in sums.items()}
+    values = {key: sum(term.share * term.coefficient for term in terms) for key, terms in sums.items()}
     fall = stribeck_term(law.terms[joint])
     if fall is not None and "static" in sums:
         values["stribeck_velocity"] = fall.parameter
     found = {}
     for key, value in values.items():
-        names = {term.name(joint + 1) for term in sums[key]} if key in sums else {STRIBECK_VELOCITY}
+        shares = {t.name(joint + 1): t.share for t in sums[key]} if key in sums else {STRIBECK_VELOCITY: 1.0}
         for part in parts:
-            chosen = np.array(
-                [u.kind == "friction" and u.joint == joint and u.name in names for u in part.unknowns], float
-            )
+            mine = (u.name if u.kind == "friction" and u.joint == joint else "" for u in part.unknowns)
+            chosen = np.array([shares.get(name, 0.0) for name in mine])
             if chosen.any():
                 error = float(np.sqrt(max(chosen @ part.covariance @ chosen, 0.0)))
                 freedom = float(part.freedom[chosen > 0].min())

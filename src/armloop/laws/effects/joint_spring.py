@@ -28,6 +28,8 @@ class JointSpring(Law):
     )
     load = True
     nested = 1
+    #: A spring of a slide without limits rests no farther away, m.
+    _REACH: ClassVar = 10.0
     alike: ClassVar = {
         "torque_offset": (
             "over a small range a spring is a constant; a run over a larger range of the joint would tell them apart"
@@ -59,8 +61,13 @@ class JointSpring(Law):
         return number(parameters["stiffness"].value) < 0 and self._rests_within_reach(arm, parameters)
 
     def _rests_within_reach(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
-        reach = 2 * np.pi if arm.joints[self.index].kind == "revolute" else 2.0
-        return abs(number(parameters["rest"].value)) < reach
+        rest, joint = number(parameters["rest"].value), arm.joints[self.index]
+        if joint.kind == "revolute":
+            return abs(rest) < 2 * np.pi
+        travel = joint.upper - joint.lower
+        if np.isfinite(travel):
+            return joint.lower - travel < rest < joint.upper + travel
+        return abs(rest) < self._REACH
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         k, rest = parameters["stiffness"], parameters["rest"]
