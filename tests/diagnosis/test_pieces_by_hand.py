@@ -115,7 +115,7 @@ class TestTrials:
         def known(rows: Any, effects: Any, shapes: Any) -> Any:
             asked.append((rows.tolist(), [e.place for e in effects], shapes))
             trial = SimpleNamespace(shapes=["old", "new"], score="score")
-            every = lambda effect, promising: None if promising and effect.place == "c" else trial  # noqa: E731
+            every = lambda effect, least: None if least > 0.0 and effect.place == "c" else trial  # noqa: E731
             return SimpleNamespace(fit=SimpleNamespace(effects=effects), trial=every)
 
         monkeypatch.setattr(trials.Known, "of", staticmethod(known))
@@ -126,14 +126,14 @@ class TestTrials:
             whole=SimpleNamespace(rows=rows, only=lambda rows: rows),
         )
         packed = np.packbits(rows).tobytes()
-        first: Any = (packed, ((1, "shape"),), True)
-        other: Any = (packed, (), True)
+        first: Any = (packed, ((1, "shape"),), 1.0)
+        other: Any = (packed, (), 1.0)
         assert trials._tried(bench, first, 0) == ("new", "score")
         assert trials._tried(bench, first, 1) is None and len(asked) == 1  # it is there already
         assert trials._tried(bench, other, 1) == ("new", "score")
         # what is not promising is told without another fit of what is known
         assert trials._tried(bench, other, 2) is None
-        assert trials._tried(bench, (*other[:2], False), 2) == ("new", "score")
+        assert trials._tried(bench, (*other[:2], -1.0), 2) == ("new", "score")
         assert asked == [(rows.tolist(), ["b"], ["shape"]), (rows.tolist(), [], [])]
 
 

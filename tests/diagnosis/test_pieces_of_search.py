@@ -81,11 +81,12 @@ class TestSearch:
             given = [x for key, x in left.items() if set(key.split()) <= set(names)]
             return score(min(given), blocks=20)
 
-        def tried(known: Any, progress: Any, promising: bool) -> list[Any]:
+        def tried(known: Any, progress: Any, least: float) -> list[Any]:
             return [
                 SimpleNamespace(effect=Named(name), shape=name.upper(), score=of([*known.names, name]))
                 for name in every
-                if name not in known.names and not (promising and not known.names and name[0] in hopeless)
+                if name not in known.names
+                and not (least > -np.inf and not known.names and name[0] in hopeless)
             ]
 
         def known(evidence: Any, found: Any) -> Any:

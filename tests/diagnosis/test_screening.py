@@ -12,7 +12,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.posterior import ALTERNATIVE, log_prior, told
 from armloop.diagnosis.search import search
-from armloop.diagnosis.trials import Known
+from armloop.diagnosis.trials import PROMISING, Known
 from armloop.laws.effects import effect, hypotheses
 from armloop.util.progress import silent
 
@@ -36,12 +36,12 @@ def test_nothing_explains_more_than_its_bound(evidence: Evidence, there: tuple[s
         if hypothesis.name in there or (trial := known.trial(hypothesis)) is None:
             continue
         gained = told(trial.score) - told(known.fit.score) + log_prior(evidence, [hypothesis])
-        assert gained <= known._at_most(hypothesis, trial.shapes[-1].final) + 1e-6
-        if known.trial(hypothesis, promising=True) is None:
+        assert gained <= known._at_most(hypothesis, trial.shapes[-1].final, True) + 1e-6
+        if known.trial(hypothesis, PROMISING) is None:
             passed_over += 1
             assert gained < np.log(ALTERNATIVE)
         else:
-            assert known.trial(hypothesis, promising=True).score.error == trial.score.error  # type: ignore[union-attr]
+            assert known.trial(hypothesis, PROMISING).score.error == trial.score.error  # type: ignore[union-attr]
     assert 20 < passed_over < len(hypotheses(evidence.model.arm)) - 2
 
 
@@ -49,7 +49,7 @@ def test_a_search_finds_what_it_finds_when_everything_is_fitted(
     evidence: Evidence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     screened = search(evidence, silent)
-    monkeypatch.setattr(trials, "_HOPELESS", -np.inf)
+    monkeypatch.setattr(trials, "_SLACK", np.inf)
     whole = search(evidence, silent)
     named, everything = (
         [

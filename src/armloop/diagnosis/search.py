@@ -21,7 +21,7 @@ from armloop.diagnosis.one_way import one_way
 from armloop.diagnosis.outcomes import Found, Outcome, clear, gradual, known_with, others_than, pruned
 from armloop.diagnosis.posterior import ALTERNATIVE, log_posterior
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.trials import Hypotheses, Known, Tried
+from armloop.diagnosis.trials import PROMISING, Hypotheses, Known, Tried
 from armloop.laws.effects import Effect
 from armloop.laws.effects.base import Place
 from armloop.util.arrays import Array
@@ -73,7 +73,7 @@ class _Search:
         self.most, self.worth = min(most, MOST_EFFECTS), worth
         self.nothing = Known.of(evidence)
         self.explainable: Array = np.maximum(self.nothing.fit.score.excess, 1e-9)
-        self._beside: dict[tuple[tuple[tuple[Place, Shape], ...], bool], tuple[Score, list[Tried]]] = {}
+        self._beside: dict[tuple[tuple[Place, Shape], ...], Known] = {}
 
     def outcome(self) -> Outcome:
         """The set from which no step leads to a better one, without what is not worth it or not clear of its error."""
@@ -165,9 +165,8 @@ class _Search:
         more = list(self._additions(found))
         if len(more) < _FIRST:
             # either of two may be nothing without the other
-            more = list(self._additions(found, promising=False))
-        for _, first in sorted(more, key=lambda step: -step[0])[:_FIRST]:
-            yield from self._additions(first)
+            more = list(self._additions(found, -np.inf))
+        yield from self._seconds(found, more)
 
     def _exchanges(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """Sets with two others in the place of two of a joint, or of one between two joints.
@@ -176,44 +175,50 @@ class _Search:
         mends it; one between two joints may take a part of what either has of its own: no single step leads from there to
         the two.
         """
-        for k, one in enumerate(found):
+        for one in found:
             if one.effect.pair_wise:
-                yield from self._two_for(others_than(found, k), one.effect.indices, {one.effect.place})
+                yield from self._two_for(found, [one], one.effect.indices)
         for pair in combinations(found, 2):
-            joint, places = pair[0].effect.joint, {f.effect.place for f in pair}
+            joint = pair[0].effect.joint
             if joint is not None and joint == pair[1].effect.joint:
-                yield from self._two_for([f for f in found if f not in pair], (joint - 1,), places)
+                yield from self._two_for(found, pair, (joint - 1,))
 
     def _two_for(
-        self, others: list[Found], joints: Sequence[int], places: Collection[Place]
+        self, found: list[Found], some: Sequence[Found], joints: Sequence[int]
     ) -> Iterator[tuple[float, list[Found]]]:
-        """Sets with two effects more, the first of them of one of some joints (0-based) and not at some places."""
+        """Sets with two others in the place of some effects, the first of them of one of some joints (0-based)."""
+        places = {f.effect.place for f in some}
         firsts = [
             step
-            for step in self._additions(others)
+            for step in self._additions([f for f in found if f not in some])
             if (new := step[1][-1].effect).joint is not None
             and new.joint - 1 in joints
             and new.place not in places
         ]
-        for _, first in sorted(firsts, key=lambda step: -step[0])[:_FIRST]:
-            yield from self._additions(first)
+        yield from self._seconds(found, firsts)
 
-    def _additions(self, found: list[Found], promising: bool = True) -> Iterator[tuple[float, list[Found]]]:
-        """Sets with one effect more, with their log posteriors."""
+    def _seconds(
+        self, found: list[Found], firsts: Sequence[tuple[float, list[Found]]]
+    ) -> Iterator[tuple[float, list[Found]]]:
+        """The likeliest of some sets with one effect more each, where that may be likelier than what was found."""
+        value = log_posterior(self.evidence, self._known(found).fit.score, [f.effect for f in found])
+        for likely, first in sorted(firsts, key=lambda step: -step[0])[:_FIRST]:
+            yield from self._additions(first, max(value - likely, PROMISING))
+
+    def _additions(self, found: list[Found], least: float = PROMISING) -> Iterator[tuple[float, list[Found]]]:
+        """Sets with one effect more, with their log posteriors, but for those that are less likely by ``least``."""
         there = [f.effect for f in found]
-        for trial in self._asked(found, promising)[1] if len(_kinds(found)) < self.most else []:
+        for trial in self._asked(found, least)[1] if len(_kinds(found)) < self.most else []:
             value = log_posterior(self.evidence, trial.score, [*there, trial.effect])
             yield value, [*found, Found(trial.effect, trial.shape, 0.0)]
 
-    def _asked(self, beside: Sequence[Found], promising: bool = True) -> tuple[Score, list[Tried]]:
-        """How these effects do, and every further one beside them that may be worth it, or every one; tried once."""
-        key = tuple((f.effect.place, f.shape) for f in beside), promising
-        if key not in self._beside:
-            known = self._known(beside)
-            trials = self.panel.tried(known, paced(self.progress), promising)
-            self._beside[key] = known.fit.score, trials
-        current, trials = self._beside[key]
-        return current, [t for t in trials if t.effect.place not in self.barred]
+    def _asked(self, beside: Sequence[Found], least: float = PROMISING) -> tuple[Score, list[Tried]]:
+        """How these effects do, and every further one beside them whose log odds may be so much; tried once."""
+        key = tuple((f.effect.place, f.shape) for f in beside)
+        known = self._beside[key] if key in self._beside else self._known(beside)
+        self._beside[key] = known
+        trials = self.panel.tried(known, paced(self.progress), least)
+        return known.fit.score, [t for t in trials if t.effect.place not in self.barred]
 
     def _known(self, found: Sequence[Found]) -> Known:
         return known_with(self.evidence, found) if found else self.nothing

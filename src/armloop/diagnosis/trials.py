@@ -25,8 +25,10 @@ from armloop.util.workers import Team
 _REFITS = 8
 #: Parameters that change by less than this part of their standard errors are the same.
 _SAME = 0.1
-#: Log odds of what is neither worth a step nor an alternative, and stays so where a nonlinear parameter is not quite known.
-_HOPELESS = np.log(ALTERNATIVE) - 1.0
+#: Log odds from which on an effect is worth trying: from there it may be an alternative to what is named.
+PROMISING = float(np.log(ALTERNATIVE))
+#: By so much a bound on log odds may be wrong, as nonlinear parameters are not quite known.
+_SLACK = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +69,11 @@ class Known:
         errors = np.hstack([e.std_error for p in other.fit.parameters for e in p.values()])
         return bool((np.abs(mine - others) <= _SAME * errors)[np.isfinite(errors)].all())
 
-    def trial(self, effect: Effect, promising: bool = False) -> Fit | None:
+    def trial(self, effect: Effect, least: float = -np.inf) -> Fit | None:
         """All effects fitted with one more; None where it cannot be there or shows nothing on this run.
 
         Args:
-            promising: None as well where its columns show already that it is no part, nor an alternative to a part, of a
-                likelier set.
+            least: None as well where its columns show already that its log posterior odds are less than that.
         """
         evidence, current = self.evidence, self.fit
         if not all(evidence.rows[:, j].any() for j in effect.indices):
@@ -81,29 +82,36 @@ class Known:
         if not shapes:
             return None
         grid = _Grid.of(self, effect, shapes) if len(shapes) > 1 else None
-        if promising and self._at_most(effect, grid.first(self, effect) if grid else shapes[0]) < _HOPELESS:
-            return None
+        if least > -np.inf:
+            first = grid.first(self, effect) if grid else shapes[0]
+            if self._at_most(effect, first, refined=grid is None) < least - _SLACK:
+                return None
         shape = _best_shape(self, effect, grid) if grid else Shape.fixed(shapes[0])
         effects, chosen = [*current.effects, effect], [*current.shapes, shape]
         trial = fit(evidence, self.residual, effects, chosen, self._columns)
         # What is known may be nothing beside it, and of either sign: it is asked again beside this one.
         return trial if trial.is_possible(-1, shapes) else None
 
-    def _at_most(self, effect: Effect, shape: float) -> float:
+    def _at_most(self, effect: Effect, shape: float, refined: bool) -> float:
         """Upper bound of the log posterior odds of an effect beside what is known (branch and bound).
 
         Least squares without constraints on the rows themselves leave no more than what was fitted without the rows that it
         is judged by: of these a fit leaves (I - H)^-1 times as much, H their part of the hat matrix. Joints that no effect
         ties to its own are left as they are.
+
+        Args:
+            refined: whether the nonlinear parameter may end anywhere, and is asked for once more where it leads to.
         """
         Q, left = self._outside
         Z = self.evidence.weighted(effect, shape)
         Z = Z - Q @ (Q.T @ Z)
-        least = left - Z @ ridge(Z.T @ Z, Z.T @ left)
+        beta = ridge(Z.T @ Z, Z.T @ left)
         rows, current = self.fit.stacked, self.fit.score
-        bound = Score.of(current.complexity, least, rows.joint, rows.block, rows.joints)
+        bound = Score.of(current.complexity, left - Z @ beta, rows.joint, rows.block, rows.joints)
         errors = np.where(self._tied(effect)[:, None], bound.errors, current.errors)
-        return told(replace(current, errors=errors)) - told(current) + log_prior(self.evidence, [effect])
+        odds = told(replace(current, errors=errors)) - told(current) + log_prior(self.evidence, [effect])
+        other = effect.refined(effect.start(beta), shape) if refined else shape
+        return odds if other == shape else max(odds, self._at_most(effect, other, False))
 
     def _tied(self, effect: Effect) -> Mask:
         """(n,) joints whose torque an effect changes, or what is known does once it is fitted beside it."""
@@ -129,9 +137,10 @@ class Tried(NamedTuple):
     score: Score
 
 
-#: Samples that count, packed, the effects that are known (their number in the list of hypotheses, and shapes), and
-#: whether only what is promising is tried.
-_Task = tuple[bytes, tuple[tuple[int, Shape], ...], bool]
+#: Samples that count, packed, and the effects that are known: their number in the list of hypotheses, and shapes.
+_Of = tuple[bytes, tuple[tuple[int, Shape], ...]]
+#: The same, and the log odds from which on a trial is asked for.
+_Task = tuple[bytes, tuple[tuple[int, Shape], ...], float]
 
 
 class Hypotheses:
@@ -148,7 +157,7 @@ class Hypotheses:
         self._bench = _Bench(whole)
         self._number = {effect.place: k for k, effect in enumerate(self._bench.listed)}
         self._team = Team(self._bench, jobs)
-        self._answers: dict[_Task, list[Tried]] = {}
+        self._answers: dict[_Of, tuple[float, list[Tried]]] = {}
 
     def __enter__(self) -> Hypotheses:
         self._team.__enter__()
@@ -157,27 +166,28 @@ class Hypotheses:
     def __exit__(self, *raised: Any) -> None:
         self._team.__exit__(*raised)
 
-    def tried(self, known: Known, tell: Progress, promising: bool = True) -> list[Tried]:
+    def tried(self, known: Known, tell: Progress, least: float = PROMISING) -> list[Tried]:
         """Trials of all further effects that can be there; of the same samples and effects they are tried once.
 
         Args:
-            promising: only of those that may be worth it, or an alternative to what is.
+            least: of effects that certainly have no such log posterior odds there are none.
         """
         numbers = (self._number[effect.place] for effect in known.fit.effects)
         there = tuple(zip(numbers, known.fit.shapes, strict=True))
-        task = np.packbits(known.evidence.rows).tobytes(), there, promising
-        if task in self._answers:
-            return self._answers[task]
+        of = np.packbits(known.evidence.rows).tobytes(), there
+        lower, answer = self._answers.get(of, (np.inf, []))
+        if lower <= least:
+            return answer
+        task = *of, least
         self._bench.task, self._bench.known = task, known
         listed, labels = self._bench.listed, ", ".join(effect.label() for effect in known.fit.effects)
         beside = f"beside {labels}: " if labels else ""
         every = self._team.map(
             _tried, task, len(listed), lambda k: tell(f"{beside}{k} of {len(listed)} hypotheses tried")
         )
-        self._answers[task] = [
-            Tried(effect, *trial) for effect, trial in zip(listed, every, strict=True) if trial is not None
-        ]
-        return self._answers[task]
+        pairs = zip(listed, every, strict=True)
+        self._answers[of] = least, [Tried(effect, *trial) for effect, trial in pairs if trial is not None]
+        return self._answers[of][1]
 
 
 class _Bench:
@@ -192,7 +202,7 @@ class _Bench:
 
 def _tried(bench: _Bench, task: _Task, k: int) -> tuple[Shape, Score] | None:
     """The trial of a hypothesis beside others; what is known is fitted by every process for itself."""
-    packed, found, promising = task
+    packed, found, least = task
     if bench.task is None or bench.task[:2] != task[:2]:
         rows = np.unpackbits(np.frombuffer(packed, np.uint8), count=bench.whole.rows.size).astype(bool)
         evidence = bench.whole.only(rows.reshape(bench.whole.rows.shape))
@@ -200,7 +210,7 @@ def _tried(bench: _Bench, task: _Task, k: int) -> tuple[Shape, Score] | None:
         bench.known, bench.task = Known.of(evidence, effects, shapes), task
     effect = bench.listed[k]
     taken = {known.place for known in bench.known.fit.effects}
-    trial = None if effect.place in taken else bench.known.trial(effect, promising)
+    trial = None if effect.place in taken else bench.known.trial(effect, least)
     return None if trial is None else (trial.shapes[-1], trial.score)
 
 

@@ -59,6 +59,14 @@ class Problem:
         return self.moments.refitted(support)
 
 
+def taken(G: Array, rows: Index, columns: Index) -> Array:
+    """Some rows and columns, rising, of a matrix; a view where they lie side by side, which costs nothing."""
+    beside = [len(k) > 0 and k[-1] - k[0] == len(k) - 1 for k in (rows, columns)]
+    if all(beside):
+        return G[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return np.asarray(G[np.ix_(rows, columns)])
+
+
 @dataclass(frozen=True, eq=False)
 class Reduction:
     """From all columns to the free ones of a :class:`Problem` and back.
@@ -85,17 +93,18 @@ class Reduction:
         """Project the forced columns out of everything and scale what is left to unit size."""
         forced = np.sort(np.asarray(forced, dtype=np.intp))
         free = np.setdiff1d(np.arange(len(moments.b)), forced)
-        G, b, yy = moments.G[np.ix_(free, free)], moments.b[free], moments.yy
+        G, b, yy = taken(moments.G, free, free), moments.b[free], moments.yy
         size, onto = np.diag(G).copy(), np.zeros((len(forced), len(free)))
         if len(forced):
-            d, S = equilibrated(moments.G[np.ix_(forced, forced)], 1e-12)
+            d, S = equilibrated(taken(moments.G, forced, forced), 1e-12)
             L = np.linalg.cholesky(S)
-            H = solve_triangular(L, d[:, None] * moments.G[np.ix_(forced, free)], lower=True)
+            H = solve_triangular(L, d[:, None] * taken(moments.G, forced, free), lower=True)
             h = solve_triangular(L, d * moments.b[forced], lower=True)
             G, b, yy = G - H.T @ H, b - H.T @ h, yy - float(h @ h)
             onto = d[:, None] * solve_triangular(L, H, lower=True, trans="T")
         left = np.diag(G) > DEPENDENT * np.maximum(size, TINY)
-        free, G, b, onto = free[left].astype(np.intp), G[np.ix_(left, left)], b[left], onto[:, left]
+        if not left.all():
+            free, G, b, onto = free[left].astype(np.intp), G[np.ix_(left, left)], b[left], onto[:, left]
         yy = max(yy, 0.0)
         unit, signal = 1 / np.sqrt(np.diag(G)), np.sqrt(yy) or 1.0
         reduced = Moments(G * np.outer(unit, unit), b * unit / signal, 1.0 if yy else 0.0, moments.count)
