@@ -335,6 +335,10 @@ class TestTrials:
         known = Known(evidence, np.zeros((800, 1)), current)
         found = best_shape(known, effect, [1.0, 2.0, 3.0])
         assert found.final == pytest.approx(chosen) and found.without == pytest.approx((chosen, chosen))
+        if noise < 1.0:
+            # what leaves least counts where it is asked whether it is worth a fit
+            first = trials._Grid.of(known, effect, [1.0, 2.0, 3.0]).first(known, effect)
+            assert first == pytest.approx(order)
 
 
 def test_a_shape_is_not_refined_beyond_what_is_tried() -> None:

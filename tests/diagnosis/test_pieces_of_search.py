@@ -82,11 +82,13 @@ class TestSearch:
             return score(min(given), blocks=20)
 
         def tried(known: Any, progress: Any, least: float) -> list[Any]:
+            more = [(Named(name), of([*known.names, name])) for name in every if name not in known.names]
+            now = posterior.told(known.fit.score)
+            odds = [posterior.log_posterior(evidence, left, [e]) - now for e, left in more]
             return [
-                SimpleNamespace(effect=Named(name), shape=name.upper(), score=of([*known.names, name]))
-                for name in every
-                if name not in known.names
-                and not (least > -np.inf and not known.names and name[0] in hopeless)
+                SimpleNamespace(effect=e, shape=e.upper(), score=left)
+                for (e, left), likely in zip(more, odds, strict=True)
+                if likely >= least and not (least > -np.inf and not known.names and e[0] in hopeless)
             ]
 
         def known(evidence: Any, found: Any) -> Any:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from armloop.diagnosis.evidence import FOLDS, Evidence
-from armloop.diagnosis.fit import Columns, Fit, Shape, fit
+from armloop.diagnosis.fit import REFINEMENTS, Columns, Fit, Shape, fit
 from armloop.diagnosis.judgement import CHANCE, lead
 from armloop.diagnosis.posterior import ALTERNATIVE, log_prior, told
 from armloop.diagnosis.score import Score
@@ -84,7 +84,7 @@ class Known:
         grid = _Grid.of(self, effect, shapes) if len(shapes) > 1 else None
         if least > -np.inf:
             first = grid.first(self, effect) if grid else shapes[0]
-            if self._at_most(effect, first, refined=grid is None) < least - _SLACK:
+            if self._at_most(effect, first, 0 if grid else REFINEMENTS) < least - _SLACK:
                 return None
         shape = _best_shape(self, effect, grid) if grid else Shape.fixed(shapes[0])
         effects, chosen = [*current.effects, effect], [*current.shapes, shape]
@@ -92,7 +92,7 @@ class Known:
         # What is known may be nothing beside it, and of either sign: it is asked again beside this one.
         return trial if trial.is_possible(-1, shapes) else None
 
-    def _at_most(self, effect: Effect, shape: float, refined: bool) -> float:
+    def _at_most(self, effect: Effect, shape: float, refinements: int) -> float:
         """Upper bound of the log posterior odds of an effect beside what is known (branch and bound).
 
         Least squares without constraints on the rows themselves leave no more than what was fitted without the rows that it
@@ -100,27 +100,28 @@ class Known:
         ties to its own are left as they are.
 
         Args:
-            refined: whether the nonlinear parameter may end anywhere, and is asked for once more where it leads to.
+            refinements: how often the nonlinear parameter is followed to where it leads, as where it may end anywhere.
         """
         Q, left = self._outside
-        Z = self.evidence.weighted(effect, shape)
-        Z = Z - Q @ (Q.T @ Z)
+        columns = self.evidence.weighted(effect, shape)
+        Z = columns - Q @ (Q.T @ columns)
         beta = ridge(Z.T @ Z, Z.T @ left)
         rows, current = self.fit.stacked, self.fit.score
         bound = Score.of(current.complexity, left - Z @ beta, rows.joint, rows.block, rows.joints)
-        errors = np.where(self._tied(effect)[:, None], bound.errors, current.errors)
+        errors = np.where(self._tied(columns)[:, None], bound.errors, current.errors)
         odds = told(replace(current, errors=errors)) - told(current) + log_prior(self.evidence, [effect])
-        other = effect.refined(effect.start(beta), shape) if refined else shape
-        return odds if other == shape else max(odds, self._at_most(effect, other, False))
+        other = effect.refined(effect.start(beta), shape) if refinements else shape
+        return odds if other == shape else max(odds, self._at_most(effect, other, refinements - 1))
 
-    def _tied(self, effect: Effect) -> Mask:
-        """(n,) joints whose torque an effect changes, or what is known does once it is fitted beside it."""
-        n = self.fit.stacked.joints
-        each = [np.isin(np.arange(n), e.indices) | (not e.indices) for e in (effect, *self.fit.effects)]
-        tied = each[0]
-        for _ in each[1:]:
-            tied = np.any([tied, *(own for own in each if (own & tied).any())], axis=0)
-        return tied
+    def _tied(self, Z: Array) -> Mask:
+        """(n,) joints whose torque columns Z (R, q) change, or columns of what is known that are fitted beside them."""
+        rows = self.fit.stacked
+        every = np.hstack([Z, rows.X]) != 0
+        acts = np.array([every[rows.joint == j].any(axis=0) for j in range(rows.joints)])
+        tied = acts[:, : Z.shape[1]].any(axis=1)
+        for _ in range(rows.joints):
+            tied = tied | acts[:, acts[tied].any(axis=0)].any(axis=1)
+        return np.asarray(tied)
 
     @cached_property
     def _outside(self) -> tuple[Array, Array]:
