@@ -72,16 +72,15 @@ class Dynamics:
         q: ArrayLike | None = None,
         t: float | Array = math.inf,
     ) -> Array:
-        """Friction at velocities v, 0 at rest; ``load`` and ``q`` for friction that changes with them (0 by default).
+        """Friction at velocities v, 0 at rest; ``load`` for friction that grows with it (0 by default).
 
-        So does ``t``, seconds since the start, one or (N,); by default the joints are warm.
+        It may change with ``q``, and with ``t``, seconds since the start, one or (N,); by default the joints are warm.
+        Raises ``ModelError`` where it changes with positions that are not given.
         """
-        nothing = np.zeros_like(_numbers(v))
-        return self._answer(
-            lambda e, x, y, z: e.friction(x, y, t, z),
-            v,
-            *(nothing if x is None else x for x in (load, q)),
-        )
+        loads = np.zeros_like(_numbers(v)) if load is None else load
+        if q is None:
+            return self._answer(lambda e, x, y: e.friction(x, y, t), v, loads)
+        return self._answer(lambda e, x, y, z: e.friction(x, y, t, z), v, loads, q)
 
     def torque(self, q: ArrayLike, v: ArrayLike, vdot: ArrayLike) -> Array:
         """Inverse dynamics: what the drives supply."""

@@ -136,8 +136,15 @@ class ModelEquations:
         Args:
             load: n torques, for friction that grows with them; 0 by default.
             t: time since the start, s, for friction that changes with it; by default that of a warm joint.
-            q: n positions, for friction that changes with them; 0 by default.
+            q: n positions, for friction that changes with them.
+
+        Raises:
+            ModelError: friction changes with the positions, and there are none.
         """
+        if q is None and any(
+            acting.element.of_position for terms in self._friction.values() for acting in terms
+        ):
+            raise ModelError("the model's friction changes with the position of a joint; give q as well")
         f, total = self.functions, [0.0] * self.n
         loads = [0.0] * self.n if load is None else load
         for along, terms in self._friction.items():

@@ -97,6 +97,13 @@ class Element:
         return not np.array_equal(early, late, equal_nan=True)
 
     @property
+    def of_position(self) -> bool:
+        """Whether it changes with the position."""
+        with np.errstate(all="ignore"):
+            here, there = (self.value(Sliding(q, *_SOMEWHERE[1:], 1.0), 0.9, NUMPY) for q in (0.37, 1.9))
+        return not np.array_equal(here, there, equal_nan=True)
+
+    @property
     def dry(self) -> bool:
         """Whether it turns with the direction of sliding."""
         back, forth = (self.value(Sliding(*_SOMEWHERE[:2], sign, 1.0), 0.9, NUMPY) for sign in (-1.0, 1.0))

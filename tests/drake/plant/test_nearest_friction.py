@@ -9,12 +9,13 @@ from numpy.testing import assert_allclose
 
 from armloop.drake.plant import nearest_friction as nearest
 from armloop.drake.plant.friction import JointFriction
-from armloop.dynamics import training_range
-from armloop.laws.effects import Estimate, effect
+from armloop.dynamics import Dynamics, training_range
+from armloop.laws.effects import REGISTRY, Element, Estimate, Law, Parameter, effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.errors import ModelError
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +64,37 @@ def test_of_another_form_the_mean_of_both_ways_is_fitted(arm) -> None:
     found = nearest.nearest_friction(model)
     assert_allclose([found[1].static, found[1].coulomb, found[1].viscous], [0.25, 0.25, 0.7], atol=1e-6)
     assert numbers(found[2]) == (0.0, 0.0, 0.1, 0.0)
+
+
+class Eccentric(Law):
+    """A seal that rubs by the position: b (1 + sin q) sign(v)."""
+
+    name = "eccentric_seal"
+    parameters = (Parameter("level", "TAU"),)
+    law = "b (1 + sin(q)) sign(v)"
+    elements = (Element(lambda x, p, f: (1 + f.sin(x.q)) * x.sign, "(1+sin(q{j}))*sign(v{j})"),)
+
+
+def test_friction_by_the_position_is_its_mean_over_the_postures_of_training(arm, monkeypatch) -> None:
+    find = REGISTRY.find
+    monkeypatch.setattr(REGISTRY, "find", lambda name: Eccentric if name == Eccentric.name else find(name))
+    model = of_joints(arm, (FrictionTerm("sign", 0.25),), (), ())
+    model = dataclasses.replace(
+        model, history={**model.history, "range": [[0.1] * 3, [1.0] * 3, [1.0] * 3, [1.5] * 3]}
+    )
+    rubs = AddedEffect(Eccentric(1), {"level": Estimate(0.4, 0.0, "1")})
+    worn = model.with_effects([rubs])
+    lower, upper = training_range(worn)
+    expected = 0.25 + 0.4 * (1 + (np.cos(lower[0]) - np.cos(upper[0])) / (upper[0] - lower[0]))
+    found = nearest.nearest_friction(worn)[0]
+    assert_allclose([found.static, found.coulomb, found.viscous], [expected, expected, 0.0], atol=2e-3)
+    # friction at no position is none that anybody could rely on
+    with pytest.raises(ModelError, match="friction changes with the position of a joint; give q as well"):
+        Dynamics(worn).friction(np.ones((2, 3)))
+    q = np.array([[1.5, 0.0, 0.0], [-1.5, 0.0, 0.0]])
+    torques = Dynamics(worn).friction(np.ones((2, 3)), q=q)
+    assert_allclose(torques[:, 0], 0.25 + 0.4 * (1 + np.sin(q[:, 0])))
+    assert_allclose(Dynamics(model).friction(np.ones((2, 3)))[:, 0], 0.25)
 
 
 @pytest.mark.parametrize(

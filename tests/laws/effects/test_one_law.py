@@ -142,7 +142,7 @@ def test_equations_of_motion_and_their_parts(name):
     def parts(d: Dynamics, friction: bool) -> np.ndarray:
         rigid = np.einsum("kij,kj->ki", d.mass_matrix(q), vdot) + d.bias(q, v) + d.gravity(q)
         load = BARE.rigid_body(MOTION)
-        return rigid + (d.friction(v, load=load) if friction else 0.0)
+        return rigid + (d.friction(v, load=load, q=q) if friction else 0.0)
 
     check(parts(dynamics, True) - parts(bare, True), name)
     # friction is in friction, and nothing else is

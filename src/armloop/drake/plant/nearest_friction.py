@@ -55,12 +55,12 @@ def _curves(model: ReconstructedModel) -> tuple[Array, Array]:
     still = [np.zeros(_POSTURES)] * n
     load = equations.load([q[:, j] for j in range(n)], still, still)
     sizes = [np.abs(np.broadcast_to(x, (_POSTURES,))).mean() for x in load]
-    loads = [np.full(_SPEEDS, x) for x in sizes]
-    curves = np.zeros((_SPEEDS, n))
+    postures, curves = [q[:, j] for j in range(n)], np.zeros((_SPEEDS, n))
     for j in range(n):
         for way in (1.0, -1.0):
-            v = [way * speeds[:, j] if k == j else np.zeros(_SPEEDS) for k in range(n)]
-            curves[:, j] += 0.5 * way * equations.friction(v, loads, 1e300)[j]
+            v = [way * speeds[:, [j]] if k == j else np.zeros((_SPEEDS, 1)) for k in range(n)]
+            rubs = equations.friction(v, sizes, 1e300, postures)[j]
+            curves[:, j] += 0.5 * way * np.broadcast_to(rubs, (_SPEEDS, _POSTURES)).mean(axis=1)
     return speeds, curves
 
 
