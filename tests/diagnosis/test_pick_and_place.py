@@ -166,11 +166,16 @@ class TestListedEffectsBeforeALaw:
             asked.append((barred, most))
             others = outcome("listed", left, "offset", "tilt")
             found = worth(Score.of(1, others.after.held_out, joint, blocks, 1))
-            return others if found else outcome("nothing", 9.0)
+            return others if found else outcome("nothing", of.get("nothing", 9.0))
 
         monkeypatch.setattr(accounts, "search", search)
         monkeypatch.setattr(
-            accounts, "find_law", lambda evidence, outcome, progress: (of.get("law"), outcome)
+            accounts,
+            "find_law",
+            lambda evidence, again, progress: (
+                of.get("law"),
+                outcome("fewer", of["fewer"], "offset") if "fewer" in of else again,
+            ),
         )
         monkeypatch.setattr(
             accounts, "without_effects_at", lambda evidence, first, j: SimpleNamespace(found=[offset])
@@ -186,6 +191,14 @@ class TestListedEffectsBeforeALaw:
     def test_they_are_named_if_they_leave_no_more(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert self.chosen(monkeypatch, 1.0) == ("listed", [([("joint_spring", 1, None)], 4)])
         assert self.chosen(monkeypatch, 1.3)[0] == "first"
+
+    def test_not_where_what_a_law_leaves_of_them_is_more(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        assert self.chosen(monkeypatch, 1.0, fewer=1.0)[0] == "fewer"
+        assert self.chosen(monkeypatch, 1.0, fewer=1.3)[0] == "first"
+
+    def test_nothing_in_their_place_takes_nothing_away(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """A residual without a law leaves as much as nothing does."""
+        assert self.chosen(monkeypatch, 1.3, nothing=1.0)[0] == "first"
 
     def test_not_if_they_too_need_a_law(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert self.chosen(monkeypatch, 1.0, law=SimpleNamespace(joint=1, left=np.ones(40)))[0] == "first"

@@ -130,6 +130,9 @@ class TestSearch:
         assert self.found(search) == ["a1", "b1"]
         search.most = 1
         assert self.found(search) == ["a1"]
+        nothing: Any = search.panel
+        more = searching._Search(search.evidence, lambda text: None, nothing, [], 99)
+        assert more.most == searching.MOST_EFFECTS
 
     @pytest.mark.parametrize("hopeless", ["", "a", "ab", "abcd"])
     def test_two_that_are_nothing_alone_are_sought_together_whatever_is_passed_over(
@@ -343,6 +346,19 @@ class TestSearch:
         monkeypatch.setattr(searching, "clear", lambda evidence, outcome: replace(outcome, found=[]))
         assert [hidden.name for _, hidden in search.outcome().masked] == ["viscous1"]
 
+    @pytest.mark.parametrize("needed", [True, False])
+    def test_what_is_plain_together_stays_though_none_of_it_is_clear(
+        self, needed: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        search = self.search(monkeypatch, {"": 9000.0, "w1": 3000.0, "x1": 4000.0, "w1 x1": 100.0})
+        monkeypatch.setattr(searching, "clear", lambda evidence, outcome: replace(outcome, found=[]))
+        asked: list[Any] = []
+        monkeypatch.setattr(searching, "_are_needed", lambda *given: asked.append(given) or needed)
+        assert self.found(search) == (["w1", "x1"] if needed else [])
+        ((unclear, together, outcome),) = asked[-1:]
+        assert {str(e) for e in unclear} == {"w1", "x1"} == {str(f.effect) for f in together.found}
+        assert outcome.found == []
+
     def test_what_was_not_worth_it_beside_another_is_asked_again_without_that(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -372,7 +388,7 @@ class TestSearch:
         ((3, 3), 200.0, 3000.0, 4.0, True, True),
         ((3, 2), 200.0, 3000.0, 4.0, True, False),  # not of one joint: two effects, none of them plain
         ((3,), 200.0, 3000.0, 4.0, True, False),  # of one alone the model's own errors may be as large
-        ((3, 3), 200.0, 350.0, 4.0, True, False),  # what is left without them is no multiple of the baseline
+        ((3, 3), 120.0, 350.0, 4.0, True, False),  # what is left without them is no multiple of the baseline
         ((3, 3), 1200.0, 3000.0, 4.0, True, False),  # most of it is left with them, too
         ((3, 3), 200.0, 3000.0, 2.9, True, False),
         ((3, 3), 200.0, 3000.0, 4.0, False, False),
@@ -399,4 +415,7 @@ def test_what_is_plain_together_alone_is_stated_together(
     together: Any = SimpleNamespace(after=fitted)
     others: Any = SimpleNamespace(after=SimpleNamespace(score=score(without, blocks=20)))
     assert searching._are_needed(effects, together, others) == needed
-    assert not asked or asked == [[1, 2]]
+    # of a single block nothing is known of chance
+    fitted.score, others.after.score = score(with_them), score(without)
+    assert not searching._are_needed(effects, together, others)
+    assert all(those == [1, 2] for those in asked)
