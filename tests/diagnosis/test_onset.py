@@ -97,7 +97,6 @@ def test_an_encoder_that_slips_is_one_offset_since_then(model: ReconstructedMode
     assert "This goes for what was recorded since 1" in entry["remedy"]
 
 
-@pytest.mark.long
 def test_a_body_is_asked_about_and_what_fades_by_itself_is_not(
     model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 from armloop.regression.estimators import Estimator
 from armloop.regression.estimators.adaptive_lasso import adaptive_lasso
 from armloop.regression.estimators.lasso import lasso
-from armloop.regression.estimators.problem import Problem, Reduction, halves
+from armloop.regression.estimators.problem import Problem, Reduction, fitted_and_held_out
 from armloop.regression.estimators.stability import _dealt, _drawn, stability
 from armloop.regression.estimators.tuning import tuned
 from armloop.regression.moments import Moments, total
@@ -102,7 +102,7 @@ def test_the_criterion_is_that_of_chen_and_chen():
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 9, 10, 14, 15])
 def test_a_fifth_of_the_parts_is_held_out(count):
     marked = [Moments(np.array([[2.0**k]]), np.zeros(1), 0.0, 1.0) for k in range(count)]
-    fitted, held = halves(marked)
+    fitted, held = fitted_and_held_out(marked)
     assert held.count == max(1, count // 5)
     assert fitted.count == count - held.count
     assert held.G[0, 0] >= 2.0 ** (count - 1) > fitted.G[0, 0]
@@ -149,7 +149,7 @@ def test_the_lassos_penalty_is_the_one_that_predicts_what_was_held_out():
     reduction = Reduction.of(Moments.of(X, y), NONE)
     parts = tuple(reduction.part(Moments.of(X[k::5], y[k::5])) for k in range(5))
     given = Problem(reduction.reduced, parts, 200.0, 1e-12, 1.0, 12, None)
-    train, check = halves(parts)
+    train, check = fitted_and_held_out(parts)
     unit = Moments(train.G / train.yy, train.b / train.yy, 1.0, train.count)
 
     def judged(penalty):

@@ -68,9 +68,9 @@ def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> 
                 names = names or tuple(found[k] for k in index)
                 others |= dict.fromkeys(name for k, name in enumerate(found) if k not in index)
                 # Velocities may be missing, from the first message on: they are then the rates of the positions.
-                moving = len(message.velocity) > 0 if not rows else len(rows[0][1]) > 0
+                has_velocities = len(message.velocity) > 0 if not rows else len(rows[0][1]) > 0
                 sizes = len(message.position), len(message.velocity), len(message.effort)
-                if sizes != (len(found), len(found) * moving, len(found)):
+                if sizes != (len(found), len(found) * has_velocities, len(found)):
                     raise LogError(
                         f"{path}: {chosen}, message {len(rows) + 1}: {sizes[0]} positions, {sizes[1]} velocities, "
                         f"{sizes[2]} efforts for {len(found)} joints; a log needs every joint's position and effort in each "
@@ -79,7 +79,7 @@ def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> 
                 stamp = message.header.stamp
                 stamps.append(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec))
                 received.append(at)
-                velocity = message.velocity[index] if moving else message.velocity
+                velocity = message.velocity[index] if has_velocities else message.velocity
                 rows.append((message.position[index], velocity, message.effort[index]))
     except (
         AnyReaderError,

@@ -11,7 +11,7 @@ import numpy as np
 from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.tuning.gain_design import propose_gains
 from armloop.drake.tuning.loop_analysis import model_posture, posture_model
-from armloop.drake.tuning.tuned_loop import TunedLoop, Tuning, look_at
+from armloop.drake.tuning.tuned_loop import TunedLoop, Tuning, evaluate_gains
 from armloop.dynamics import with_mass_matrix
 from armloop.model import ReconstructedModel
 from armloop.util.doubts import warn
@@ -58,9 +58,9 @@ def tune_scenario(
         warn(f"{scenario.name}: gains are tuned for the arm without the scenario's effects ({named})")
     gains = propose_gains(known, plant.config.time_step, bandwidth, margin)
     progress("trying the scenario's gains")
-    present = look_at(scenario, scenario.gains)
+    present = evaluate_gains(scenario, scenario.gains)
     progress("trying the proposed gains")
-    tuning = Tuning(scenario, bandwidth, margin, present, look_at(scenario, gains))
+    tuning = Tuning(scenario, bandwidth, margin, present, evaluate_gains(scenario, gains))
     answer = tuning_answer(tuning)
     if folder is not None:
         from armloop.reports.plots.loops import bode_figure, step_figure

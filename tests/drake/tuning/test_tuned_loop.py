@@ -67,7 +67,7 @@ def looked_at(
         ),
     )
     gains: Any = "gains"
-    return tuned_loop.look_at(scenario, gains), asked
+    return tuned_loop.evaluate_gains(scenario, gains), asked
 
 
 def test_at_the_start_and_along_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:

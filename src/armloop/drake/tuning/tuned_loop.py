@@ -94,7 +94,7 @@ def along_reference(scenario: TrackingScenario, effects: Effects) -> dict[float,
     }
 
 
-def look_at(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:
+def evaluate_gains(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:
     """Return what a scenario's arm does with these gains, in the posture where its reference begins and along it."""
     q0 = scenario.reference.evaluate([0.0])[0][0]
     plant, period = scenario.plant, scenario.plant.config.time_step

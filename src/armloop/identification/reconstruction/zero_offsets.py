@@ -1,4 +1,4 @@
-"""Zeros of the joints: whether one is further than its position says, by a little or by a quarter turn.
+"""Encoder zero errors from torques: whether a joint is further than its position says, by a little or by quarter turns.
 
 An encoder that was mastered wrongly, or a maker whose zero is not that of the URDF: what hangs on the joint is then loaded
 from another side than its positions say. Of the last joint nothing tells, nor of an upright first one.

@@ -1,4 +1,4 @@
-"""The default: the support with the best extended Bayesian information criterion that a thorough search finds.
+"""Subset selection by the extended Bayesian information criterion: the best support that a thorough search finds.
 
 Starts are the supports along the Lasso path (Eq. 32), and what backward elimination makes of its long end; both are
 improved by exact add, drop and swap moves and, where these are stuck, by exchanging two or three terms for two others.

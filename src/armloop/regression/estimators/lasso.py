@@ -13,7 +13,7 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import lars_path_gram
 
-from armloop.regression.estimators.problem import Problem, halves
+from armloop.regression.estimators.problem import Problem, fitted_and_held_out
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array
 
@@ -48,7 +48,7 @@ def lasso(problem: Problem) -> Array:
     # is noise that it follows.
     steps = min(steps, 6 * problem.max_terms)
     if len(problem.parts) >= 2:
-        train, check = halves(problem.parts)
+        train, check = fitted_and_held_out(problem.parts)
         alphas, betas = path(train, steps, _LAST * train.yy)
         errors = [check.squared_error(beta) for beta in betas.T]
         # in units of the signal that was fitted

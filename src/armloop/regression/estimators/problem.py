@@ -134,7 +134,7 @@ class Reduction:
         return full
 
 
-def halves(parts: Sequence[Moments]) -> tuple[Moments, Moments]:
+def fitted_and_held_out(parts: Sequence[Moments]) -> tuple[Moments, Moments]:
     """What is fitted and what is held out when a penalty is chosen: four fifths and the last fifth of the parts."""
     held = max(1, len(parts) // 5)
     return total(parts[:-held]), total(parts[-held:])

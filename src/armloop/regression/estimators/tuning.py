@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from armloop.regression.estimators.problem import Problem, halves
+from armloop.regression.estimators.problem import Problem, fitted_and_held_out
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array
 
@@ -28,7 +28,7 @@ def tuned(problem: Problem, fits: Fits, grid: Sequence[float] = THRESHOLDS) -> A
     if problem.penalty is not None:
         return fits(problem.moments)(problem.penalty)
     held_out = len(problem.parts) >= 2
-    train, check = halves(problem.parts) if held_out else (problem.moments, problem.moments)
+    train, check = fitted_and_held_out(problem.parts) if held_out else (problem.moments, problem.moments)
     fit, found, trouble = fits(train), list[tuple[float, float, Array]](), list[str]()
     for penalty in grid:
         try:
