@@ -10,6 +10,7 @@ import numpy as np
 
 from armloop.data.log import write_log
 from armloop.data.motion import Motion
+from armloop.drake.control.controllers import controller_named, controller_of
 from armloop.drake.experiments.collection import collect
 from armloop.drake.experiments.metrics import BAND
 from armloop.drake.experiments.scenarios import TrackingScenario, load_plan
@@ -105,15 +106,17 @@ def _say_doubts(scenario: TrackingScenario, models: Mapping[str, ReconstructedMo
         for words in extrapolated(scenario.plant.arm, motion, model.history.get("range")):
             warn(f"{scenario.name}, model {name}: {words}; what it feeds forward there is extrapolated")
     rubs = (other_friction(model, scenario.plant, scenario.effects) for model in models.values())
-    weighs = (_other_inertia(scenario, model) for name, model in models.items() if _moves(name))
+    weighs = (_other_inertia(scenario, model) for name, model in models.items() if _moves(scenario, name))
     # of one model under several names it is said once
     for words in filter(None, dict.fromkeys([*rubs, *weighs])):
         warn(f"{scenario.name}: {words}; as it is, what is fed forward is another arm's")
 
 
-def _moves(name: str) -> bool:
-    """Whether a model of this name is used with its acceleration terms."""
-    return name not in ("step1", "step2", "pid_step1", "pid_step2")
+def _moves(scenario: TrackingScenario, name: str) -> bool:
+    """Whether a controller uses a model of this name with its acceleration terms."""
+    kinds = map(controller_named, (*scenario.controllers, controller_of(name)))
+    steps = [kind.step for kind in kinds if name in (kind.name, *kind.models)]
+    return not steps or max(steps) == 3
 
 
 def _other_inertia(scenario: TrackingScenario, model: ReconstructedModel) -> str:
