@@ -109,7 +109,7 @@ RULES = [
         (contacts, "far_outside"),
     ),
     _rule(
-        "nothing is judged below half of the slowest trained speed",
+        "nothing is judged below the slowest trained speed",
         lambda model, samples: np.zeros(samples.tau.shape, dtype=bool),
         (evidence, "too_slow"),
     ),

@@ -83,7 +83,7 @@ def test_creep_into_points_is_no_friction_that_came(tmp_path: Path, monkeypatch:
     generate_outside(509, 1, tmp_path / "logs", tmp_path / "answers", points=True)
     (verdict,) = judge(tmp_path / "logs" / "outside_509", tmp_path / "verdict.json").values()
     assert verdict["verdict"] == "no_effect", verdict["effects"]
-    assert any("slower than half of what it was trained at" in reason for reason in verdict["reasons"])
+    assert any("slower than it was trained at" in reason for reason in verdict["reasons"])
 
 
 def test_of_a_measured_arm_what_its_model_lacks_all_along_is_not_judged() -> None:

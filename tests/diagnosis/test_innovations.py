@@ -86,7 +86,10 @@ def at_speeds(v: list[float], starts: tuple[int, ...] = (0,), **of: Any) -> Any:
     given = np.array(v)[:, None]
     time = 0.04 * np.arange(len(v))
     motion = Motion(time, 0 * given, given, 0 * given, np.array(starts))
-    samples = SimpleNamespace(motion=motion, cutoff_hz=0.0, period=0.04, reach=of.get("reach", 0.0))
+    moving = np.ones(given.shape, dtype=bool)
+    samples = SimpleNamespace(
+        motion=motion, cutoff_hz=0.0, period=0.04, reach=of.get("reach", 0.0), moving=moving
+    )
     model = SimpleNamespace(
         history=of.get("history", {}),
         friction=of.get("friction"),
@@ -172,7 +175,7 @@ class TestInnovations:
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """Whatever they left of faster creeping: a wrist that other joints drag along is no event."""
-        history = {"range": [[9.0], [2.0], [9.0], [9.0]], "slowest": [0.05]}
+        history = {"range": [[9.0], [2.0], [9.0], [9.0]], "slowest": [0.1]}
         v, residual = [0.04, -0.04, 0.04, 0.06], [0.7, -0.7, 3.0, 3.0]
         found = self.found(
             monkeypatch,

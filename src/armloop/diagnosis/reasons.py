@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from armloop.data.motion import Samples
 from armloop.diagnosis.evidence import (
     FAR,
     FEWEST_BLOCKS,
@@ -99,7 +100,7 @@ def standing(
     slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
     slides = sliding(samples, model)
     few = seldom(model, samples, slides & ~strays & ~creeps)
-    reasons = [*_outside(outside, far), *_slow(model, slow)]
+    reasons = [*_outside(outside, far), *_slow(model, samples, slow)]
     unknown, unexplained, judged, rough = False, [], 0, []
     multiples: list[bool | None] = []
     largest = 0.0
@@ -342,7 +343,7 @@ def _uncounted(
     if (slides & ~strays).sum() < _FEWEST:
         where = f"beyond {FAR:g} times the range the model was trained on"
     elif (slides & ~strays & ~creeps).sum() < _FEWEST:
-        where = f"slower than half of what it was trained at, or beyond {FAR:g} times the range"
+        where = f"slower than it was trained at, or beyond {FAR:g} times the range"
     elif few:
         counts = int((slides & ~strays & ~creeps).sum())
         return (
@@ -369,18 +370,17 @@ def _outside(outside: Array, far: Array) -> list[str]:
     return [f"samples outside the range the model was trained on: {', '.join(said)}{rest}"]
 
 
-def _slow(model: ReconstructedModel, slow: Array) -> list[str]:
+def _slow(model: ReconstructedModel, samples: Samples, slow: Array) -> list[str]:
     """A sentence on the joints that slide too slowly to be judged in a part (n,) of the samples that they move in."""
-    speeds = known_from(model)
+    if not (slow > WORTH_A_WORD).any():
+        return []
+    speeds = known_from(model, samples)
     said = [
         f"{slow[j]:.0%} of joint {j + 1}'s (below {speeds[j]:.2g} {'rad/s' if model.arm.revolute[j] else 'm/s'})"
         for j in np.flatnonzero(slow > WORTH_A_WORD)
     ]
-    if not said:
-        return []
     return [
-        "samples in which a joint slides slower than half of what it was trained at, which were not judged: "
-        f"{', '.join(said)}"
+        f"samples in which a joint slides slower than it was trained at, which were not judged: {', '.join(said)}"
     ]
 
 

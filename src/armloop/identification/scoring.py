@@ -26,9 +26,10 @@ _MOSTLY = 0.67
 #: Less than this part of the largest joint's torque is rounding.
 _ROUND_OFF = 1e-9
 
-#: From this part of the slowest speed that a joint held in training on, friction is known: the filter has mixed it with what
-#: the joint passed through on its way there. One that always makes the same strokes would else be known at one speed alone.
-_MIXED = 0.5
+#: A joint of which less than this part of what moves is as fast as it slid in training is judged from this part of that
+#: speed on: the filter has mixed it with what the joint passed through on its way there. One that always makes the same
+#: strokes would else be known at one speed alone.
+_SLOW, _MIXED = 0.1, 0.5
 
 
 @dataclass(frozen=True)
@@ -58,12 +59,16 @@ def too_slow(model: ReconstructedModel, samples: Samples) -> Mask:
     """(N, n) samples around which a joint is slower than its friction is known from: neither a baseline nor a run is judged
     by them. Where it only passes through such a speed, it did so in training, too.
     """
-    return np.asarray(held_speed(samples) < known_from(model))
+    return np.asarray(held_speed(samples) < known_from(model, samples))
 
 
-def known_from(model: ReconstructedModel) -> Array:
-    """(n,) held speed, rad/s (m/s), from which on the friction of each joint is known; zero where nobody knows."""
-    return np.asarray(_MIXED * np.asarray(model.history.get("slowest") or 0.0))
+def known_from(model: ReconstructedModel, samples: Samples) -> Array:
+    """(n,) held speed, rad/s (m/s), from which on the friction of each joint is known: the slowest of training, or half of
+    it in a run that is slower nearly throughout; zeros where nobody knows.
+    """
+    slowest, moving = np.asarray(model.history.get("slowest") or 0.0), samples.moving
+    fast = (moving & (held_speed(samples) >= slowest)).sum(axis=0)
+    return np.where(fast < _SLOW * moving.sum(axis=0), _MIXED * slowest, slowest)
 
 
 def filtered_context(model: ReconstructedModel, samples: Samples, effects: Sequence[Effect]) -> Context:
@@ -85,12 +90,12 @@ def of_slow_motion(model: ReconstructedModel, samples: Samples) -> list[str]:
     """A sentence on each joint that errs mostly where it slides slower than its friction is known from."""
     samples = without_shared_standstill(samples, model)
     moving, error = samples.moving, residual(model, samples)
-    rows, speeds = (moving, moving & ~too_slow(model, samples)), known_from(model)
+    rows, speeds = (moving, moving & ~too_slow(model, samples)), known_from(model, samples)
     pairs = zip(*(score_errors(error, samples.tau, kept).moving["nrmse"] for kept in rows), strict=True)
     return [
-        f"joint {j}: {100 * every:.2g}% of the torque, but {100 * rest:.2g}% without samples slower than half of what it "
-        f"slid at in training (below {speeds[j - 1]:.2g} {model.arm.joints[j - 1].position_unit}/s), of whose friction the "
-        "model knows nothing"
+        f"joint {j}: {100 * every:.2g}% of the torque, but {100 * rest:.2g}% without samples slower than it slid in "
+        f"training (below {speeds[j - 1]:.2g} {model.arm.joints[j - 1].position_unit}/s), of whose friction the model "
+        "knows nothing"
         for j, (every, rest) in enumerate(pairs, 1)
         if every is not None and rest is not None and rest < _MOSTLY * every
     ]
