@@ -66,7 +66,10 @@ def known_from(model: ReconstructedModel, samples: Samples) -> Array:
     """(n,) held speed, rad/s (m/s), from which on the friction of each joint is known: the slowest of training, or half of
     it in a run that is slower nearly throughout; zeros where nobody knows.
     """
-    slowest, moving = np.asarray(model.history.get("slowest") or 0.0), samples.moving
+    known = model.history.get("slowest")
+    if not known:
+        return np.zeros(samples.motion.joints)
+    slowest, moving = np.asarray(known), samples.moving
     fast = (moving & (held_speed(samples) >= slowest)).sum(axis=0)
     return np.where(fast < _SLOW * moving.sum(axis=0), _MIXED * slowest, slowest)
 
