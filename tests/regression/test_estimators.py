@@ -8,7 +8,7 @@ import pytest
 
 from armloop.regression.estimators import LISTED, Estimator, Problem, Reduction
 from armloop.regression.estimators.lasso import lasso
-from armloop.regression.estimators.problem import halves
+from armloop.regression.estimators.problem import fitted_and_held_out
 from armloop.regression.estimators.rooted import rooted
 from armloop.regression.estimators.stability import stability
 from armloop.regression.estimators.stlsq import stlsq
@@ -151,7 +151,7 @@ def test_an_unknown_name_is_refused():
 def test_a_penalty_is_chosen_on_parts_that_were_not_fitted(parts, held):
     # each part is a power of two of its own: a sum says of which parts it is
     marked = [Moments(np.array([[2.0**k]]), np.zeros(1), 0.0, 1.0) for k in range(parts)]
-    fitted, left_out = halves(marked)
+    fitted, left_out = fitted_and_held_out(marked)
     assert left_out.G[0, 0] == sum(2.0**k for k in held)
     assert fitted.G[0, 0] + left_out.G[0, 0] == 2.0**parts - 1
 
