@@ -116,7 +116,7 @@ RULES = [
     _rule("a joint that is shaken rests", lambda s, m: s.moving.copy(), (evidence, "_sliding")),
     _rule("listed effects before a law", lambda self, *_: self, (account.Account, "_or_listed")),
     _rule("what is plain together alone is stated", lambda *_: False, (search, "_are_needed")),
-    _rule("two at once", lambda self, found: iter(()), (search._Search, "_pairs")),
+    _rule("two at once", lambda *_: iter(()), (search._Search, "_pairs")),
     _rule(
         "odds against every parameter",
         lambda e, effects: 0.0,

@@ -16,6 +16,8 @@ from armloop.laws.effects import EFFECTS, Context, effect
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
 
+#: Effects that the plant can have and no run is drawn with: what an arm is built with, and what has cases of its own.
+NOT_DRAWN = ("spring_balancer", "elastic_cable")
 KINDS = ("one", "one", "one", "one", "two", "clean", "unlisted")
 
 
@@ -77,7 +79,7 @@ def draw(run: Run, seed: int) -> Hidden:
     effects: list[UndeclaredEffect] = []
     sizes: list[float] = []
     while len(effects) < (2 if kind == "two" else 1):
-        name = str(rng.choice([n for n in REALISED if n not in names]))
+        name = str(rng.choice([n for n in REALISED if n not in names and n not in NOT_DRAWN]))
         size = float(np.exp(rng.uniform(np.log(0.01), np.log(0.3))))
         found = _sized(run, name, size, rng)
         if found is not None:
@@ -175,6 +177,11 @@ def _drawn(
         case "joint_spring":
             rest = middle + travel * rng.uniform(-0.4, 0.4)
             return {"stiffness": 1.0, "rest": rest}, ("stiffness",), any_size
+        case "lower_end_stop" | "upper_end_stop":
+            begins = middle + travel * rng.uniform(-0.25, 0.25)
+            return {"stiffness": 1.0, "begins": begins}, ("stiffness",), any_size
+        case "coupling_spring":
+            return {"stiffness": 1.0, "rest": 0.0, "ratio": sign}, ("stiffness",), any_size
         case "torque_ripple":
             order = float(rng.integers(5, 21))
             return (

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 HERE = Path(__file__).parent
@@ -18,11 +19,14 @@ sys.path.insert(0, str(HERE))
 import generate as generate_module  # noqa: E402
 import loops  # noqa: E402
 from generate import generate  # noqa: E402
+from hidden import NOT_DRAWN, REALISED, Run, _sized  # noqa: E402
 from judge import LARGE, Case, is_right, of_changes  # noqa: E402
 from run import judge  # noqa: E402
 
 from armloop.data.log import read_log  # noqa: E402
 from armloop.drake.experiments.scenarios import load_plan  # noqa: E402
+from armloop.drake.plant.friction import JointFriction  # noqa: E402
+from armloop.experiment.excitation import MotionRanges, fourier_reference  # noqa: E402
 from armloop.identification.reconstruction import reconstruct  # noqa: E402
 from armloop.robot.arm import load_arm  # noqa: E402
 
@@ -84,6 +88,19 @@ def test_creep_into_points_is_no_friction_that_came(tmp_path: Path, monkeypatch:
     (verdict,) = judge(tmp_path / "logs" / "outside_509", tmp_path / "verdict.json").values()
     assert verdict["verdict"] == "no_effect", verdict["effects"]
     assert any("slower than it was trained at" in reason for reason in verdict["reasons"])
+
+
+@pytest.mark.parametrize("name", [name for name in REALISED if name not in NOT_DRAWN])
+def test_every_effect_of_a_plant_can_be_hidden_at_a_size(name: str) -> None:
+    """At one of a few places at least, with the parameters that the plant takes."""
+    arm, friction = load_arm("three_axis"), JointFriction(0.6, 0.5, 0.1, 0.3)
+    ranges = MotionRanges(*(np.full(3, x) for x in (-1.0, 1.0, 1.5, 5.0)))
+    run = Run.of(arm, [friction] * arm.n, fourier_reference(ranges, 20.0, 1, harmonics=5))
+    drawn = [_sized(run, name, 0.1, np.random.default_rng(seed)) for seed in range(8)]
+    found = [each for each in drawn if each is not None]
+    assert found and all(each.name == name for each in found)
+    # a delay is scaled as if its torque were in proportion to it
+    assert all(0.05 < run.size(each) < 0.2 for each in found)
 
 
 def test_of_a_measured_arm_what_its_model_lacks_all_along_is_not_judged() -> None:

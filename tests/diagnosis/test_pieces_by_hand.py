@@ -115,25 +115,27 @@ class TestTrials:
         def known(rows: Any, effects: Any, shapes: Any) -> Any:
             asked.append((rows.tolist(), [e.place for e in effects], shapes))
             trial = SimpleNamespace(shapes=["old", "new"], score="score")
-            every = lambda effect, least: None if least > 0.0 and effect.place == "c" else trial  # noqa: E731
-            return SimpleNamespace(fit=SimpleNamespace(effects=effects), trial=every)
+            return SimpleNamespace(
+                fit=SimpleNamespace(effects=effects),
+                trial=lambda effect, least: None if least > 0.0 and effect.place == "c" else trial,
+            )
 
         monkeypatch.setattr(trials.Known, "of", staticmethod(known))
         rows = np.array([[True, False], [True, True]])
         bench: Any = SimpleNamespace(
-            task=None,
+            of=None,
             listed=[SimpleNamespace(place=place) for place in "abc"],
             whole=SimpleNamespace(rows=rows, only=lambda rows: rows),
         )
         packed = np.packbits(rows).tobytes()
-        first: Any = (packed, ((1, "shape"),), 1.0)
-        other: Any = (packed, (), 1.0)
+        first: Any = (packed, ((1, "shape"),)), 1.0
+        other: Any = (packed, ()), 1.0
         assert trials._tried(bench, first, 0) == ("new", "score")
         assert trials._tried(bench, first, 1) is None and len(asked) == 1  # it is there already
         assert trials._tried(bench, other, 1) == ("new", "score")
         # what is not promising is told without another fit of what is known
         assert trials._tried(bench, other, 2) is None
-        assert trials._tried(bench, (*other[:2], -1.0), 2) == ("new", "score")
+        assert trials._tried(bench, (other[0], -1.0), 2) == ("new", "score")
         assert asked == [(rows.tolist(), ["b"], ["shape"]), (rows.tolist(), [], [])]
 
 
@@ -289,7 +291,13 @@ class TestWhatIsKnownOfARun:
             (0.0, 0.25),
         ):
             samples: Any = SimpleNamespace(
-                motion=given, tau=tau, cutoff_hz=cutoff, unknown=None, period=0.25, reach=0
+                motion=given,
+                tau=tau,
+                cutoff_hz=cutoff,
+                unknown=None,
+                period=0.25,
+                reach=0,
+                moving=np.ones((40, 3), dtype=bool),
             )
             samples.at_an_end = np.zeros(40, dtype=bool)
             made = Evidence.of(model, samples, [])

@@ -73,7 +73,7 @@ class _Search:
         self.most, self.worth = min(most, MOST_EFFECTS), worth
         self.nothing = Known.of(evidence)
         self.explainable: Array = np.maximum(self.nothing.fit.score.excess, 1e-9)
-        self._beside: dict[tuple[tuple[Place, Shape], ...], Known] = {}
+        self._beside: dict[tuple[tuple[Place, Shape], ...], tuple[Score, float, list[Tried]]] = {}
 
     def outcome(self) -> Outcome:
         """The set from which no step leads to a better one, without what is not worth it or not clear of its error."""
@@ -82,7 +82,7 @@ class _Search:
         while True:
             best, others = max(self._steps(found), key=lambda step: step[0], default=(value, found))
             if best <= value + _LEAST:
-                further = chain(self._pairs(found), self._exchanges(found))
+                further = chain(self._pairs(found, value), self._exchanges(found, value))
                 best, others = max(further, key=lambda step: step[0], default=(value, found))
             if best <= value + _LEAST:
                 break
@@ -158,17 +158,21 @@ class _Search:
             yield log_posterior(self.evidence, current, [f.effect for f in others]), others
             yield from self._additions(others)
 
-    def _pairs(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
-        """The same with two effects more, where much is left: what either leaves may be as large as what it removes."""
+    def _pairs(self, found: list[Found], value: float) -> Iterator[tuple[float, list[Found]]]:
+        """The same with two effects more, where much is left: what either leaves may be as large as what it removes.
+
+        Args:
+            value: log posterior of those found, which a set must exceed.
+        """
         if len(_kinds(found)) + 2 > self.most or not much_lasts(self.evidence, self._known(found).fit).any():
             return
         more = list(self._additions(found))
         if len(more) < _FIRST:
             # either of two may be nothing without the other
             more = list(self._additions(found, -np.inf))
-        yield from self._seconds(found, more)
+        yield from self._seconds(more, value)
 
-    def _exchanges(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
+    def _exchanges(self, found: list[Found], value: float) -> Iterator[tuple[float, list[Found]]]:
         """Sets with two others in the place of two of a joint, or of one between two joints.
 
         One effect may lie between two that are there, as a gain does between inertia and friction, and be found with what
@@ -177,14 +181,14 @@ class _Search:
         """
         for one in found:
             if one.effect.pair_wise:
-                yield from self._two_for(found, [one], one.effect.indices)
+                yield from self._two_for(found, [one], one.effect.indices, value)
         for pair in combinations(found, 2):
             joint = pair[0].effect.joint
             if joint is not None and joint == pair[1].effect.joint:
-                yield from self._two_for(found, pair, (joint - 1,))
+                yield from self._two_for(found, pair, (joint - 1,), value)
 
     def _two_for(
-        self, found: list[Found], some: Sequence[Found], joints: Sequence[int]
+        self, found: list[Found], some: Sequence[Found], joints: Sequence[int], value: float
     ) -> Iterator[tuple[float, list[Found]]]:
         """Sets with two others in the place of some effects, the first of them of one of some joints (0-based)."""
         places = {f.effect.place for f in some}
@@ -195,13 +199,12 @@ class _Search:
             and new.joint - 1 in joints
             and new.place not in places
         ]
-        yield from self._seconds(found, firsts)
+        yield from self._seconds(firsts, value)
 
     def _seconds(
-        self, found: list[Found], firsts: Sequence[tuple[float, list[Found]]]
+        self, firsts: Sequence[tuple[float, list[Found]]], value: float
     ) -> Iterator[tuple[float, list[Found]]]:
-        """The likeliest of some sets with one effect more each, where that may be likelier than what was found."""
-        value = log_posterior(self.evidence, self._known(found).fit.score, [f.effect for f in found])
+        """The likeliest of some sets with one effect more each, where that may exceed a log posterior."""
         for likely, first in sorted(firsts, key=lambda step: -step[0])[:_FIRST]:
             yield from self._additions(first, max(value - likely, PROMISING))
 
@@ -215,10 +218,12 @@ class _Search:
     def _asked(self, beside: Sequence[Found], least: float = PROMISING) -> tuple[Score, list[Tried]]:
         """How these effects do, and every further one beside them whose log odds may be so much; tried once."""
         key = tuple((f.effect.place, f.shape) for f in beside)
-        known = self._beside[key] if key in self._beside else self._known(beside)
-        self._beside[key] = known
-        trials = self.panel.tried(known, paced(self.progress), least)
-        return known.fit.score, [t for t in trials if t.effect.place not in self.barred]
+        if key not in self._beside or self._beside[key][1] > least:
+            known = self._known(beside)
+            trials = self.panel.tried(known, paced(self.progress), least)
+            self._beside[key] = known.fit.score, least, trials
+        current, _, trials = self._beside[key]
+        return current, [t for t in trials if t.effect.place not in self.barred]
 
     def _known(self, found: Sequence[Found]) -> Known:
         return known_with(self.evidence, found) if found else self.nothing

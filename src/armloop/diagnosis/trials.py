@@ -141,7 +141,7 @@ class Tried(NamedTuple):
 #: Samples that count, packed, and the effects that are known: their number in the list of hypotheses, and shapes.
 _Of = tuple[bytes, tuple[tuple[int, Shape], ...]]
 #: The same, and the log odds from which on a trial is asked for.
-_Task = tuple[bytes, tuple[tuple[int, Shape], ...], float]
+_Task = tuple[_Of, float]
 
 
 class Hypotheses:
@@ -179,12 +179,11 @@ class Hypotheses:
         lower, answer = self._answers.get(of, (np.inf, []))
         if lower <= least:
             return answer
-        task = *of, least
-        self._bench.task, self._bench.known = task, known
+        self._bench.of, self._bench.known = of, known
         listed, labels = self._bench.listed, ", ".join(effect.label() for effect in known.fit.effects)
         beside = f"beside {labels}: " if labels else ""
         every = self._team.map(
-            _tried, task, len(listed), lambda k: tell(f"{beside}{k} of {len(listed)} hypotheses tried")
+            _tried, (of, least), len(listed), lambda k: tell(f"{beside}{k} of {len(listed)} hypotheses tried")
         )
         pairs = zip(listed, every, strict=True)
         self._answers[of] = least, [Tried(effect, *trial) for effect, trial in pairs if trial is not None]
@@ -194,7 +193,7 @@ class Hypotheses:
 class _Bench:
     """A run, all hypotheses, and what was known last."""
 
-    task: _Task | None = None
+    of: _Of | None = None
     known: Known
 
     def __init__(self, whole: Evidence) -> None:
@@ -203,12 +202,13 @@ class _Bench:
 
 def _tried(bench: _Bench, task: _Task, k: int) -> tuple[Shape, Score] | None:
     """The trial of a hypothesis beside others; what is known is fitted by every process for itself."""
-    packed, found, least = task
-    if bench.task is None or bench.task[:2] != task[:2]:
+    of, least = task
+    if bench.of != of:
+        packed, found = of
         rows = np.unpackbits(np.frombuffer(packed, np.uint8), count=bench.whole.rows.size).astype(bool)
         evidence = bench.whole.only(rows.reshape(bench.whole.rows.shape))
         effects, shapes = [bench.listed[number] for number, _ in found], [shape for _, shape in found]
-        bench.known, bench.task = Known.of(evidence, effects, shapes), task
+        bench.known, bench.of = Known.of(evidence, effects, shapes), of
     effect = bench.listed[k]
     taken = {known.place for known in bench.known.fit.effects}
     trial = None if effect.place in taken else bench.known.trial(effect, least)

@@ -59,18 +59,20 @@ def too_slow(model: ReconstructedModel, samples: Samples) -> Mask:
     """(N, n) samples around which a joint is slower than its friction is known from: neither a baseline nor a run is judged
     by them. Where it only passes through such a speed, it did so in training, too.
     """
-    return np.asarray(held_speed(samples) < known_from(model, samples))
+    speed = held_speed(samples)
+    return np.asarray(speed < _known_from(model, samples.moving, speed))
 
 
 def known_from(model: ReconstructedModel, samples: Samples) -> Array:
     """(n,) held speed, rad/s (m/s), from which on the friction of each joint is known: the slowest of training, or half of
     it in a run that is slower nearly throughout; zeros where nobody knows.
     """
-    known = model.history.get("slowest")
-    if not known:
-        return np.zeros(samples.motion.joints)
-    slowest, moving = np.asarray(known), samples.moving
-    fast = (moving & (held_speed(samples) >= slowest)).sum(axis=0)
+    return _known_from(model, samples.moving, held_speed(samples))
+
+
+def _known_from(model: ReconstructedModel, moving: Mask, speed: Array) -> Array:
+    slowest = np.asarray(model.history.get("slowest") or np.zeros(speed.shape[1]))
+    fast = (moving & (speed >= slowest)).sum(axis=0)
     return np.where(fast < _SLOW * moving.sum(axis=0), _MIXED * slowest, slowest)
 
 

@@ -29,7 +29,6 @@ from armloop.identification.reconstruction import differential
 from armloop.identification.reconstruction.lines import between, lines
 from armloop.identification.reconstruction.projected import CHANCE, Projected, Trial
 from armloop.laws.effects import Context, Effect, Estimate, hypotheses
-from armloop.laws.effects.base import Place
 from armloop.model import AddedEffect
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Mask
@@ -174,14 +173,9 @@ class Laws:
         return found
 
     def possible(self, arm: Arm, theta: Array, covariance: Array) -> Laws:
-        """Those that an arm can have with such coefficients, each beside the ones before it."""
-        had: set[Place] = set()
-        kept = []
-        for law, added in zip(self.chosen, self.added(arm, theta, covariance), strict=True):
-            if added.effect.possible(arm, added.parameters, had):
-                kept.append(law)
-                had.add(added.effect.place)
-        return replace(self, chosen=kept)
+        """Those that an arm can have with such coefficients."""
+        pairs = zip(self.chosen, self.added(arm, theta, covariance), strict=True)
+        return replace(self, chosen=[law for law, a in pairs if a.effect.possible(arm, a.parameters)])
 
     def notes(self, effects: Sequence[AddedEffect]) -> list[str]:
         """What was found, a line each, with the parameters of the model's effects."""
