@@ -11,7 +11,8 @@ from armloop.reports.words import MISSING, number, with_error
 _STRIBECK = {"static": "f_s", "coulomb": "f_c", "viscous": "f_v", "stribeck_velocity": "v_s"}
 NOTE = (
     "± is one standard error, from leaving out blocks of samples one after the other, so that errors may be "
-    "correlated within a block; the interval is that of Student's t for 95 %. The terms are taken as given: that the "
+    "correlated within a block, and from leaving out logs where these differ by more than chance; the interval is that of "
+    "Student's t for 95 %. The terms are taken as given: that the "
     "same data chose them, terms that are missing and noise in the motion are not part of it."
 )
 

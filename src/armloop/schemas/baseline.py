@@ -49,6 +49,7 @@ class BaselineData(Struct):
     worst: PerJointOrNull | UnsetType = UNSET
     reversals: PerJointOrNull | UnsetType = UNSET
     creeping: PerJointOrNull | UnsetType = UNSET
+    logs: Annotated[list[NotNegative | None], Meta(max_length=MOST_JOINTS)] = []
     samples: Count | UnsetType = UNSET
     joints: Annotated[list[EnergyPartsData], Meta(max_length=MOST_JOINTS)] | UnsetType = UNSET
     null: Annotated[list[NullData], Meta(max_length=100_000)] | UnsetType = UNSET

@@ -248,6 +248,9 @@ class UncertaintyData(Struct):
     stribeck: Annotated[list[dict[Name, Any]], Meta(max_length=MOST_JOINTS)] = []
     torque: Annotated[list[TorqueErrorsData], Meta(max_length=MOST_JOINTS)] = []
     torque_lag: Finite = 0.0
+    heterogeneity: Annotated[
+        float, Meta(ge=0.0, description="variance between logs of a usual coefficient, by that by blocks")
+    ] = 0.0
     between_logs: Annotated[
         list[Annotated[list[_Pair], _TWO] | None],
         Meta(

@@ -1,5 +1,6 @@
 """Coulomb level and viscous coefficient of any law, with the correlations of its elements in their errors."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,12 @@ def line(law: list[FrictionTerm], covariance: np.ndarray) -> dict:
     motion = fourier_motion(20.0, 50.0, 1)
     samples = Samples(motion, np.zeros_like(motion.q), np.ones(motion.q.shape, dtype=bool), 0.02)
     names = [term.name(1) for term in law]
-    return friction_line(model, 0, names, covariance, 20.0, samples, np.abs(motion.v[:, 0]) > 0.05)
+    return friction_line(model, 0, names, of(covariance, 20.0), samples, np.abs(motion.v[:, 0]) > 0.05)
+
+
+def of(covariance: np.ndarray, freedom: float) -> Callable[[np.ndarray], tuple[float, float]]:
+    """Errors of sums by a covariance."""
+    return lambda weights: (float(np.sqrt(weights @ covariance @ weights)), freedom)
 
 
 def test_elements_that_share_a_level_add_up_and_their_errors_cancel() -> None:
@@ -75,12 +81,12 @@ def test_the_stribeck_falls_own_velocity_has_its_part_in_the_error() -> None:
     # the fall's velocity and the level that it falls from, correlated
     own = np.zeros((4, 4))
     own[np.ix_([0, 2], [0, 2])] = [[0.02**2, 0.6 * 0.02 * 0.05], [0.6 * 0.02 * 0.05, 0.05**2]]
-    found = friction_line(model, 0, names, own, 12.34, samples, rows)
+    found = friction_line(model, 0, names, of(own, 12.34), samples, rows)
 
     def moved(level: float, by: float) -> dict:
         terms = (replace(law[0], coefficient=0.5 + level), replace(law[1], parameter=0.4 + by), law[2])
         other = replace(model, friction=FrictionLaw((terms, (), ())))
-        return friction_line(other, 0, names, own, 12.34, samples, rows)
+        return friction_line(other, 0, names, of(own, 12.34), samples, rows)
 
     for key in ("coulomb", "viscous"):
         slopes = [
@@ -89,7 +95,7 @@ def test_the_stribeck_falls_own_velocity_has_its_part_in_the_error() -> None:
         variance = slopes @ own[np.ix_([0, 2], [0, 2])] @ slopes
         assert found[key]["std_error"] == pytest.approx(np.sqrt(variance), rel=1e-3)
         assert found[key]["degrees_of_freedom"] == 12.3
-    nothing = friction_line(model, 0, names, own, 9.0, samples, np.zeros_like(rows))
+    nothing = friction_line(model, 0, names, of(own, 9.0), samples, np.zeros_like(rows))
     assert nothing == {}
 
 

@@ -206,26 +206,37 @@ def test_blocks_suit_the_slowest_residual_and_the_shortest_data(monkeypatch: pyt
     monkeypatch.setattr(standard, "correlation_time", correlation_time)
     monkeypatch.setattr(standard, "covered_time", covered_time)
     monkeypatch.setattr(standard, "block_length", lambda correlation, covered: 10 * correlation + covered)
-    monkeypatch.setattr(standard, "independent_blocks", lambda motion, seconds: asked.update(seconds=seconds))
+
+    def independent_blocks(motion: Any, seconds: float) -> Any:
+        asked["seconds"] = seconds
+        return np.array([0, 0, 1, 1, 2, 2])
+
+    monkeypatch.setattr(standard, "independent_blocks", independent_blocks)
+    monkeypatch.setattr(standard, "log_numbers", lambda motion: np.array([0, 0, 0, 0, 1, 1]))
+    monkeypatch.setattr(
+        standard.ByLogs, "of", lambda sums, logs, covariance: asked.update(logs=logs.tolist())
+    )
     sums = SimpleNamespace(
         covariance=lambda: 0.0,
         degrees_of_freedom=lambda: None,
         late=lambda: (0.0, 0.0),
         shifted=lambda: np.zeros(1),
     )
-    monkeypatch.setattr(standard, "_equations", lambda *_: SimpleNamespace(met=sums))
+    sums.met = sums
+    monkeypatch.setattr(standard, "_equations", lambda *_: sums)
     model: Any = SimpleNamespace(arm=SimpleNamespace(n=2))
     samples: Any = SimpleNamespace(motion=motion)
     fitted: Any = [SimpleNamespace(rows=each) for each in rows]
     found, seconds, correlation = standard.covariances(model, samples, fitted)
     assert (correlation, seconds, asked["seconds"], asked["step"]) == (4.0, 60.0, 60.0, 0.5)
+    assert asked["logs"] == [0, 0, 1]
     assert asked["covered"] == [[True] * 6, [True] * 3 + [False] * 3]
     assert [len(each.unknowns) for each in found] == [1, most]
 
 
 def test_errors_are_roots_of_variances_that_rounding_made_no_less_than_none() -> None:
     nothing: Any = None
-    errors = standard.Errors([], np.diag([4.0, -1e-20, 0.25]), nothing, nothing)
+    errors = standard.Errors([], np.diag([4.0, -1e-20, 0.25]), np.ones(3), nothing)
     assert errors.std_error.tolist() == [2.0, 0.0, 0.5]
 
 
@@ -330,23 +341,24 @@ def test_a_model_keeps_errors_where_they_belong_and_none_that_is_no_number(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Of two joints: what the fitted samples do not determine has no error, or no degrees of freedom."""
+    nothing: Any = None
+    errors_of = [(1.0, 10.0), (np.inf, 20.0), (2.0, 30.0), (3.0, 40.0)]
     first = SimpleNamespace(
         equations=SimpleNamespace(late=lambda: (3.0, 4.0)),
+        of_sum=lambda weights: errors_of[int(np.argmax(weights))],
         unknowns=[
             unknown("a", 0, kind="joints"),
             unknown("b", 1, kind="joints"),
             unknown("c", 1),
             unknown("d", None, kind="shared"),
         ],
-        std_error=np.array([1.0, np.inf, 2.0, 3.0]),
-        freedom=np.array([10.0, 20.0, 30.0, 40.0]),
         covariance="covariance",
         gram="gram",
         undetermined=lambda: ["one"],
     )
     second = SimpleNamespace(**vars(first))
     second.unknowns = [unknown("e", 0), unknown("f", 0)]
-    second.std_error, second.freedom = np.array([4.0, 5.0]), np.array([np.nan, 50.0])
+    second.of_sum = lambda weights: [(4.0, np.nan), (5.0, 50.0)][int(np.argmax(weights))]
     rows = [np.array([[True, False], [False, False]]), np.array([[False, False], [False, True]])]
     monkeypatch.setattr(standard, "covariances", lambda *_: ([first, second], 7.0, 0.5))
     monkeypatch.setattr(standard, "_stribeck", lambda model, parts, joint: f"law {joint}")
@@ -356,7 +368,6 @@ def test_a_model_keeps_errors_where_they_belong_and_none_that_is_no_number(
     monkeypatch.setattr(standard, "leading", lambda covariance, gram: (covariance, gram))
     monkeypatch.setattr(standard, "to_dict", lambda unknowns, directions: (len(unknowns), *directions))
     model: Any = SimpleNamespace(arm=SimpleNamespace(n=2))
-    nothing: Any = None
     kept = standard_errors(model, nothing, [SimpleNamespace(rows=one) for one in rows])  # type: ignore[misc]
 
     def errors(table: dict[str, Any]) -> dict[str, float]:

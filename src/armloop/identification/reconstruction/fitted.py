@@ -12,10 +12,12 @@ from armloop.data.signals import smooth
 from armloop.identification.goodness.null import empirical_null
 from armloop.identification.reconstruction.data import WINDOW, Chunk, Data
 from armloop.identification.reconstruction.found import Found
+from armloop.identification.reconstruction.left_out_logs import errors_of_left_out_logs
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.reconstruction.shared import sliding_rows
 from armloop.identification.scoring import residual
 from armloop.identification.uncertainty import Fitted, between_logs, standard_errors
+from armloop.identification.uncertainty.between_logs import log_numbers
 from armloop.identification.uncertainty.blocking import independent_blocks
 from armloop.identification.uncertainty.cross_fitting import cross_fitted, training_parts
 from armloop.identification.uncertainty.standard_errors import MOST_UNKNOWNS
@@ -52,14 +54,27 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
     }
 
 
-def left_out_null(model: ReconstructedModel, data: Data, found: Found, shared: bool) -> list[dict[str, Any]]:
-    """What laws of the catalogue remove of a model's cross-fitted residual; nothing of models with too many coefficients."""
+def left_out(model: ReconstructedModel, data: Data, found: Found, shared: bool) -> dict[str, Any]:
+    """What parts of the training data show that the coefficients were not regressed on.
+
+    Returns:
+        ``null``: what laws of the catalogue remove of the residual on left-out parts; nothing of models with too many
+        coefficients; ``logs``: :func:`armloop.identification.reconstruction.left_out_logs.errors_of_left_out_logs`.
+    """
     samples, rows = _regressed(model, data, found, shared)
     if samples.cutoff_hz <= 0 or max(len(one.unknowns) for one in problems(model)) > MOST_UNKNOWNS:
-        return []
-    parts = training_parts(samples.motion)
-    left = cross_fitted(replace(model, effects=()), samples, rows, parts)
-    return empirical_null(model, samples, left, parts)
+        return {"null": []}
+    bare, parts, logs = (
+        replace(model, effects=()),
+        training_parts(samples.motion),
+        log_numbers(samples.motion),
+    )
+    left = cross_fitted(bare, samples, rows, parts)
+    whole = left if np.array_equal(parts, logs) else cross_fitted(bare, samples, rows, logs)
+    return {
+        "null": empirical_null(model, samples, left, parts),
+        "logs": errors_of_left_out_logs(samples, whole, logs),
+    }
 
 
 def _regressed(

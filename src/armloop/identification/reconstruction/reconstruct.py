@@ -19,8 +19,9 @@ from armloop.identification.goodness.witness import MOST, Witness
 from armloop.identification.reconstruction.bandwidth import check_nyquist
 from armloop.identification.reconstruction.data import Chunk, Data, View
 from armloop.identification.reconstruction.excitation import check_recorded, determined
-from armloop.identification.reconstruction.fitted import left_out_null, uncertainty
+from armloop.identification.reconstruction.fitted import left_out, uncertainty
 from armloop.identification.reconstruction.friction_selection import check_laws
+from armloop.identification.reconstruction.left_out_logs import notes as left_out_logs_notes
 from armloop.identification.reconstruction.libraries import (
     Attempt,
     Contender,
@@ -45,6 +46,7 @@ from armloop.identification.reconstruction.torque_lag import Beside
 from armloop.identification.scoring import Score, residual
 from armloop.identification.shared_motors import sharing, without_shared_standstill
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
+from armloop.identification.uncertainty.heterogeneity import notes as heterogeneity_notes
 from armloop.model import ReconstructedModel
 from armloop.model.added_effect import ripples
 from armloop.robot.arm import Arm
@@ -319,8 +321,9 @@ def _finished(
     model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
     if ready.options.parts and method != REFERENCE:
         progress("what laws of the catalogue find in runs left out of the regression")
-        null = {"null": left_out_null(model, data, found, tried.library.shared)}
-        model = replace(model, baseline={**model.baseline, **null})
+        parts_left_out = left_out(model, data, found, tried.library.shared)
+        model = replace(model, baseline={**model.baseline, **parts_left_out})
+        notes += left_out_logs_notes(model)
     for doubt in doubtful(outlying_stretches(model, data.by_log), model.torque_units):
         warn(doubt)
     checks = check_physics(model)
@@ -334,7 +337,7 @@ def _finished(
     if ready.options.standard_errors:
         progress("standard errors of the coefficients")
         model = replace(model, uncertainty=uncertainty(model, data, found, tried.library.shared))
-        notes += between_logs_notes(model)
+        notes += [*between_logs_notes(model), *heterogeneity_notes(model)]
         model = replace(model, history={**model.history, "notes": notes})
     return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
 

@@ -26,16 +26,15 @@ def friction_line(
     model: ReconstructedModel,
     joint: int,
     names: Sequence[str],
-    covariance: Array,
-    freedom: float,
+    error: Callable[[Array], tuple[float, float]],
     samples: Samples,
     rows: Mask,
 ) -> dict[str, Any]:
     """f_c, f_v of a joint (0-based) with standard errors, and the speeds between which they hold.
 
     Args:
-        names: of the p unknowns of the joint's friction, ``v_s`` among them.
-        covariance: (p, p) of these.
+        names: of p unknowns, those of the joint's friction, ``v_s`` among them, and nothing for others.
+        error: standard error and degrees of freedom of their sum with weights (p,).
         rows: (N,) samples fitted.
 
     Friction that grows with the load is left out: the line is that of the unloaded joint. Empty where there is none.
@@ -61,9 +60,8 @@ def friction_line(
             assert own is not None
             weights[:, k] = fit @ _odd(lambda term, motion: term.slope(motion, 0), own, v)
     values = line @ [t.coefficient for t in terms]
-    errors = np.sqrt(np.maximum(np.einsum("ik,kl,il->i", weights, covariance, weights), 0.0))
-    pairs = zip(("coulomb", "viscous"), values, errors, strict=True)
-    found = {key: {"value": float(x), **entry(e, freedom)} for key, x, e in pairs}
+    pairs = zip(("coulomb", "viscous"), values, weights, strict=True)
+    found = {key: {"value": float(x), **entry(*error(own))} for key, x, own in pairs}
     return {**found, "speeds": [float(low), float(high)]}
 
 

@@ -59,6 +59,15 @@ class Equations:
         """The number B of blocks."""
         return len(self.score)
 
+    def grouped(self, groups: Index) -> Equations:
+        """The same by groups of blocks: (B,) number of the group of each."""
+        jacobian, score, count = (
+            np.zeros((int(groups.max()) + 1, *x.shape[1:])) for x in (self.jacobian, self.score, self.count)
+        )
+        for sums, each in ((jacobian, self.jacobian), (score, self.score), (count, self.count)):
+            np.add.at(sums, groups, each)
+        return replace(self, jacobian=jacobian, score=score, count=count)
+
     @cached_property
     def scale(self) -> Array:
         """(p,) factors that make the columns' squares sum to one."""
@@ -71,6 +80,13 @@ class Equations:
     def step(self) -> Array:
         """(p,) Gauss-Newton step towards the root; where all columns are linear it ends there."""
         return gauss_newton_step(self.jacobian.sum(axis=0), self.score.sum(axis=0))
+
+    def own_steps(self) -> Array:
+        """(B, p) what each block moves the coefficients by: together they move them by nothing."""
+        share = self.count / np.maximum(self.count.sum(axis=0), TINY)
+        score = self.score - share * self.score.sum(axis=0)
+        jacobian = self.jacobian.sum(axis=0)
+        return np.array([gauss_newton_step(jacobian, one) for one in score])
 
     def step_without(self, block: int) -> Array:
         """(p,) Gauss-Newton step of all blocks but one; what the others tell next to nothing of stays."""
@@ -105,7 +121,11 @@ class Equations:
         return np.asarray(inverse * spread * np.multiply.outer(self.scale, self.scale))
 
     def degrees_of_freedom(self) -> Array:
-        """(p,) of Student's t: the number of blocks that really determine a coefficient, less one.
+        """(p,) of Student's t: the number of blocks that really determine a coefficient, less one, but one at least."""
+        return np.maximum(self.effective_blocks() - 1, 1.0)
+
+    def effective_blocks(self) -> Array:
+        """(p,) number of blocks that really determine a coefficient.
 
         A block's weight is the variance it would contribute with independent errors; the effective number of
         blocks is (Σ w)²/Σ w² (Satterthwaite; Carter, Schnepel and Steigerwald 2017).
@@ -114,8 +134,7 @@ class Equations:
         inverse = np.linalg.inv(_ridged(total))
         noise = np.where(self.stage[:, None] == self.stage, self._scaled, 0.0) * self.variance
         weight = np.einsum("bkm,km->bk", inverse @ noise, inverse)
-        effective = weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), TINY)
-        return np.maximum(effective - 1, 1.0)
+        return np.asarray(weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), TINY))
 
 
 def gauss_newton_step(jacobian: Array, score: Array) -> Array:

@@ -8,7 +8,7 @@ estimate.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -17,6 +17,7 @@ import numpy as np
 from armloop.data.blocks import overlapping
 from armloop.data.motion import Samples
 from armloop.data.signals import rate_along
+from armloop.identification.uncertainty.between_logs import log_numbers
 from armloop.identification.uncertainty.blocking import (
     block_length,
     correlation_time,
@@ -24,6 +25,7 @@ from armloop.identification.uncertainty.blocking import (
     independent_blocks,
 )
 from armloop.identification.uncertainty.friction_lines import entry, friction_line
+from armloop.identification.uncertainty.heterogeneity import ByLogs, Heterogeneity
 from armloop.identification.uncertainty.propagated import leading, to_dict
 from armloop.identification.uncertainty.sandwich import Equations, gauss_newton_step
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
@@ -54,17 +56,37 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """One problem's unknowns with their covariance (p, p) and degrees of freedom (p,)."""
+    """One problem's unknowns with their errors.
+
+    Attributes:
+        covariance: (p, p) by blocks.
+        freedom: (p,) its degrees of freedom.
+        by_logs: the same by logs; None of one log, and of logs alike.
+        heterogeneity: how much more than blocks the logs of the model tell of all unknowns.
+    """
 
     unknowns: list[Unknown]
     covariance: Array
     freedom: Array
     equations: Equations
+    by_logs: ByLogs | None = None
+    heterogeneity: Heterogeneity = field(default_factory=Heterogeneity)
 
     @property
     def std_error(self) -> Array:
         """(p,) standard errors."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+        return np.array([self.of_sum(one)[0] for one in np.eye(len(self.covariance))])
+
+    def of_sum(self, weights: Array) -> tuple[float, float]:
+        """Standard error of a sum of the unknowns, weights (p,), and its degrees of freedom (Satterthwaite)."""
+        variance = max(float(weights @ self.covariance @ weights), 0.0)
+        used = weights != 0
+        freedom = float(self.freedom[used].min()) if used.any() else 1.0
+        if self.by_logs is None or not variance or not self.heterogeneity.usual:
+            return float(np.sqrt(variance)), freedom
+        more, of_logs = self.heterogeneity.beside(*self.by_logs.ratio(weights, variance))
+        whole = (1 + more) ** 2 / (1 / freedom + more**2 / of_logs)
+        return float(np.sqrt((1 + more) * variance)), whole
 
     @property
     def _products(self) -> Array:
@@ -91,7 +113,6 @@ class Errors:
             return []
         names = [self.unknowns[k].name for k in order]
         values = np.array([self.unknowns[k].value for k in order])
-        covariance = self.covariance[np.ix_(order, order)]
         mixed = [(int(k), row) for k, row in zip(kept, sums, strict=True) if np.count_nonzero(row) > 1]
         joints = [self.unknowns[k].joint for k in order]
         return [
@@ -102,7 +123,7 @@ class Errors:
                     {
                         "sum": combination(row, names, k),
                         "value": float(row @ values),
-                        "std_error": float(np.sqrt(max(row @ covariance @ row, 0.0))),
+                        "std_error": self.of_sum(row[np.argsort(order)])[0],
                     }
                     for k, row in mixed
                     if joints[k] == joint
@@ -128,6 +149,7 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
         ``torque``: the coefficients' covariance by the directions that the torque feels
         (:mod:`armloop.identification.uncertainty.propagated`);
         ``torque_lag``: by how many seconds the torque is recorded later than the motion (:func:`torque_lag`);
+        ``heterogeneity``: variance between logs of a usual coefficient, in units of that by blocks; 0 where logs are alike;
         ``block_seconds``: length of the blocks; ``correlation_seconds``: the residual's correlation time.
     """
     parts, seconds, correlation = covariances(model, samples, fitted)
@@ -138,7 +160,8 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
         "shared": {},
     }
     for part in parts:
-        for unknown, error, freedom in zip(part.unknowns, part.std_error, part.freedom, strict=True):
+        for unknown, own in zip(part.unknowns, np.eye(len(part.unknowns)), strict=True):
+            error, freedom = part.of_sum(own)
             place = table[unknown.kind]
             where = place if unknown.joint is None else place[unknown.joint]
             # what the fitted samples do not determine has no error; it must not spoil the model's file
@@ -151,7 +174,8 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
     table["torque"] = [to_dict(part.unknowns, leading(part.covariance, part.gram)) for part in parts]
     table["torque_lag"] = torque_lag([part.equations for part in parts])
     return {
-        "method": "jackknife over blocks of samples; the terms are taken as given",
+        "method": "jackknife over blocks of samples, and over logs where they differ; the terms are taken as given",
+        "heterogeneity": parts[0].heterogeneity.usual if parts else 0.0,
         "block_seconds": seconds,
         "correlation_seconds": correlation,
         **table,
@@ -174,17 +198,22 @@ def covariances(
     seconds = block_length(correlation, min(covered))
     blocks = independent_blocks(samples.motion, seconds)
     every = [
-        (problem.unknowns, _equations(problem, samples, fitted, blocks, spread).met)
+        (problem.unknowns, _equations(problem, samples, fitted, blocks, spread))
         for problem in todo
         if 0 < len(problem.unknowns) <= MOST_UNKNOWNS
     ]
     late = torque_lag([sums for _, sums in every])
+    logs = log_numbers(samples.motion)[np.searchsorted(blocks, np.arange(int(blocks[-1]) + 1))]
     found = []
     for unknowns, sums in every:
+        met = sums.met
         shift = late * sums.shifted()
-        covariance = sums.covariance() + np.outer(shift, shift)
-        found.append(Errors(unknowns, covariance, sums.degrees_of_freedom(), sums))
-    return found, seconds, correlation
+        covariance = met.covariance() + np.outer(shift, shift)
+        by_logs = ByLogs.of(sums, logs, covariance)
+        found.append(Errors(unknowns, covariance, met.degrees_of_freedom(), met, by_logs))
+    told = [(one.by_logs, one.covariance) for one in found if one.by_logs is not None]
+    apart = Heterogeneity.of(told, len(logs))
+    return [replace(one, heterogeneity=apart) for one in found], seconds, correlation
 
 
 def torque_lag(equations: Sequence[Equations]) -> float:
@@ -364,8 +393,7 @@ def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) ->
             mine = (u.name if u.kind == "friction" and u.joint == joint else "" for u in part.unknowns)
             chosen = np.array([shares.get(name, 0.0) for name in mine])
             if chosen.any():
-                error = float(np.sqrt(max(chosen @ part.covariance @ chosen, 0.0)))
-                freedom = float(part.freedom[chosen > 0].min())
+                error, freedom = part.of_sum(chosen)
                 if np.isfinite(error) and np.isfinite(freedom):
                     found[key] = {"value": float(value), **entry(error, freedom)}
     return found
@@ -378,9 +406,6 @@ def _line(
     for part in parts:
         own = np.array([u.kind == "friction" and u.joint == joint for u in part.unknowns], dtype=bool)
         if own.any():
-            names = [u.name for u, mine in zip(part.unknowns, own, strict=True) if mine]
-            covariance = part.covariance[np.ix_(own, own)]
-            return friction_line(
-                model, joint, names, covariance, float(part.freedom[own].min()), samples, rows
-            )
+            names = [u.name if mine else "" for u, mine in zip(part.unknowns, own, strict=True)]
+            return friction_line(model, joint, names, part.of_sum, samples, rows)
     return {}
