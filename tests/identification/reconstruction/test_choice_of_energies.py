@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import reduce
+from operator import iadd
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +17,7 @@ from armloop.data.motion import Motion, Samples
 from armloop.features.lagrangian import EnergyTerms, candidates
 from armloop.identification.reconstruction import lagrangian
 from armloop.identification.reconstruction.data import Chunk
-from armloop.identification.reconstruction.lagrangian import _Problem, _Problems
+from armloop.identification.reconstruction.lagrangian import _Left, _Problem, _Problems
 from armloop.identification.reconstruction.shared import FRICTION
 from armloop.regression.moments import Moments
 from armloop.util.errors import ExcitationError
@@ -46,17 +48,31 @@ class TestSums:
         samples = unfiltered(40, 0)
         rows = np.random.default_rng(1).random((40, 3)) < 0.4
         monkeypatch.setattr(lagrangian, "_CHUNK", 7)
-        found = lagrangian._problem(library, samples, rows)
-        assert found.total == 5 + 3 * len(FRICTION) and len(found.parts) == 3
-        columns = library.columns(samples.motion)
-        for j, (where, part) in enumerate(found.parts):
-            own = rows[:, j]
-            assert where.tolist() == acting[j] + [5 + 6 * j + k for k in range(6)]
+        weights = np.array([1.0, 4.0, 0.5])
+        found = _Problem.of(library, samples, rows, weights)
+        columns, G, b, yy = library.columns(samples.motion), np.zeros((23, 23)), np.zeros(23), 0.0
+        theta = np.random.default_rng(2).normal(size=23)
+        chunk = Chunk(samples, *np.zeros((4, 40), dtype=np.intp))
+        monkeypatch.setattr(lagrangian, "_used", lambda chunk: (rows, ~rows))
+        left = _Left.of(chunk, library, theta)
+        for j, acts in enumerate(acting):
+            own, where = rows[:, j], np.array(acts + [5 + 6 * j + k for k in range(6)])
             rubs = np.column_stack([term.column(samples.motion, j) for term in FRICTION])
-            X, y = np.hstack([columns[own, j][:, acting[j]], rubs[own]]), samples.tau[own, j]
-            np.testing.assert_allclose(part.G, X.T @ X, atol=1e-12)
-            np.testing.assert_allclose(part.b, X.T @ y, atol=1e-12)
-            assert (part.yy, part.count) == (pytest.approx(y @ y), own.sum())
+            X, y = np.hstack([columns[own, j][:, acts], rubs[own]]), samples.tau[own, j]
+            G[np.ix_(where, where)] += weights[j] * X.T @ X
+            b[where] += weights[j] * X.T @ y
+            yy += weights[j] * y @ y
+            rest = y - X @ theta[where]
+            assert (left.squares[j], left.power[j]) == (pytest.approx(rest @ rest), pytest.approx(y @ y))
+        np.testing.assert_allclose(found.moments.G, G, atol=1e-12)
+        np.testing.assert_allclose(found.moments.b, b, atol=1e-12)
+        assert (found.moments.yy, found.moments.count) == (pytest.approx(yy), rows.sum())
+        assert found.counts.tolist() == left.counts.tolist() == rows.sum(axis=0).tolist()
+
+    def test_no_error_of_a_joint_is_less_than_round_off(self) -> None:
+        left = _Left(np.array([8.0, 0.0, 0.0]), np.array([1.0, 1e3, 0.0]), np.array([4.0, 10.0, 0.0]))
+        assert left.errors == pytest.approx([2.0, 1e-8, 0.0])
+        assert (left + left).errors == pytest.approx([2.0, 1e-8, 0.0])
 
     def test_what_slides_fast_and_tells_something_new_is_fitted_or_judges(self) -> None:
         samples = unfiltered(40, 0)
@@ -66,13 +82,14 @@ class TestSums:
         mask = np.zeros((3, 40), dtype=bool)
         mask[0, [3, 12, 20, 30]], mask[1, 20:], mask[2, ::2] = True, True, True
         chunk = Chunk(samples, np.zeros(40, dtype=np.intp), mask[0], mask[1], mask[2])
-        found = _Problems.of(chunk, terms("v1^2", "v2^2", "v3^2"))
+        found = _Problems.of(chunk, terms("v1^2", "v2^2", "v3^2"), np.ones(3))
         # of the even ones, 12 is held out before 20, and 20 and 30 after it; slow are 0, 2, 4 and at rest 6, 8, 10
-        assert [part.count for _, part in found.fit.parts] == [6.0, 6.0, 9.0]
-        assert [part.count for _, part in found.judge.parts] == [8.0, 8.0, 8.0]
-        twice = found + found
-        assert [part.count for _, part in twice.fit.parts] == [12.0, 12.0, 18.0]
-        assert [part.count for _, part in twice.judge.parts] == [16.0, 16.0, 16.0]
+        assert found.fit.counts.tolist() == [6.0, 6.0, 9.0] and found.fit.moments.count == 21.0
+        assert found.judge.counts.tolist() == [8.0, 8.0, 8.0]
+        once, twice = replace(found.fit.moments, G=found.fit.moments.G.copy()), reduce(iadd, [found, found])
+        assert twice.fit.counts.tolist() == [12.0, 12.0, 18.0] and twice.judge.moments.count == 48.0
+        for key in ("G", "b", "yy"):
+            np.testing.assert_allclose(getattr(twice.fit.moments, key), 2 * getattr(once, key), atol=1e-12)
 
 
 def test_a_constant_force_is_weight_where_a_slide_lifts_it_and_an_offset_elsewhere(
@@ -85,43 +102,49 @@ def test_a_constant_force_is_weight_where_a_slide_lifts_it_and_an_offset_elsewhe
     total, rng = 7 + 2 * len(FRICTION), np.random.default_rng(0)
     offset = [term.kind for term in FRICTION].index("offset")
     assert offset == lagrangian._OFFSET
-    parts = []
-    for j, size in enumerate((2.0, 5.0)):
-        X = rng.normal(size=(60, total))
-        parts.append((np.arange(total), Moments.of(X, X[:, 4] + size * rng.normal(size=60) * (j + 1))))
-    fit, judge = _Problem(total, parts), _Problem(total, [(w, m + m) for w, m in parts])
-    data: Any = SimpleNamespace(sum=lambda function, what: _Problems(fit, judge))
+    whole = Moments.of(X := rng.normal(size=(60, total)), X[:, 4] + rng.normal(size=60))
+    given: list[Any] = []
+
+    def passed(function: Any, what: str) -> Any:
+        given.append(function.keywords)
+        if function.func == _Left.of:
+            return _Left(np.array([3.0, 8.0]), np.ones(2), np.array([6.0, 4.0]))
+        fit = _Problem(whole, np.array([5.0, 6.0]))
+        return [_Problems(fit, replace(fit, moments=whole + whole))]
+
+    data: Any = SimpleNamespace(sum=passed, map=passed)
     asked: list[tuple[Moments, Moments, list[int], int]] = []
 
     def greedy(own: Moments, other: Moments, forced: Any, count: int) -> Any:
         asked.append((own, other, forced.tolist(), count))
-        return np.append(forced, 4)
+        return np.append(forced, 4 if len(asked) == 1 else 5)
 
     monkeypatch.setattr(lagrangian, "_greedy", greedy)
     for weighs, lifts in (([0], [3]), ([1], [2]), ([0, 1], [2, 3]), ([], [])):
         asked.clear()
-        chosen = lagrangian._choose(library, data, weighs)
-        assert chosen.tolist() == [0, 1, *lifts, 4]
+        given.clear()
+        weights = np.array([0.5, 0.25])
+        chosen = lagrangian._choose(library, data, weights, weighs)
+        assert chosen.tolist() == [0, 1, *lifts, 5]
         friction = [7 + 6 * j + k for j in range(2) for k in range(6) if k != offset or j not in weighs]
-        assert len(asked) == 2
-        assert all(call[2:] == ([0, 1, *lifts, *friction], 7) for call in asked)
-        weights = np.array([part.count / part.yy for _, part in parts])
-        for own, other, *_ in asked:
-            np.testing.assert_allclose(own.G, fit.weighted(weights).G)
-            np.testing.assert_allclose(other.G, 2 * own.G)
-            support = np.array([0, 1, *lifts, *friction, 4])
-            theta = np.zeros(total)
-            theta[support] = own.solve(support)
-            weights = 1 / fit.errors(theta)
+        assert [call[2:] for call in asked] == 2 * [([0, 1, *lifts, *friction], 7)]
+        assert all((own, other.count) == (whole, 2 * whole.count) for own, other, *_ in asked)
+        first, left, second = given
+        # by the torque, then by what the terms of the first round leave of each joint
+        assert (first["weights"] == weights).all() and second["weights"].tolist() == [2.0, 0.5]
+        support = np.array([0, 1, *lifts, *friction, 4])
+        energies = [0, 1, *lifts, 4]
+        assert (left["library"].degrees == degrees[energies]).all()
+        expected = whole.refitted(support)
+        np.testing.assert_allclose(left["theta"], expected[[*energies, *range(7, total)]])
 
 
 def test_a_joint_that_never_slides_fast_is_told_by_its_number() -> None:
     library = EnergyTerms(np.zeros(2, dtype=bool), *np.zeros((3, 2, 2), dtype=int))
-    given = Moments.of(np.ones((3, 2)), np.ones(3))
-    parts = [(np.arange(2), given), (np.arange(2), replace(given, count=0.0, yy=0.0))]
-    data: Any = SimpleNamespace(sum=lambda function, what: _Problems(_Problem(2, parts), _Problem(2, parts)))
+    fit = _Problem(Moments.of(np.ones((3, 2)), np.ones(3)), np.array([3.0, 0.0]))
+    data: Any = SimpleNamespace(map=lambda function, what: [_Problems(fit, fit)])
     with pytest.raises(ExcitationError, match=r"^q2: no sample"):
-        lagrangian._choose(library, data, [])
+        lagrangian._choose(library, data, np.ones(2), [])
 
 
 class Faked:

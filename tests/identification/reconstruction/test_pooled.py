@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.stats import multivariate_normal
 
-from armloop.identification.reconstruction.joint_sums import JointSums, _Running
+from armloop.identification.reconstruction.joint_sums import JointSums
 from armloop.identification.reconstruction.pooled import Pooled, Prior, _at_rest
 from armloop.laws.friction import KINDS, FrictionTerm
 from armloop.regression.moments import Moments
@@ -215,18 +215,6 @@ def test_a_choice_is_by_the_places_of_its_terms_and_sums_add_up() -> None:
     for one, two in zip(data.sums().parts[0], both.parts[0], strict=True):
         np.testing.assert_allclose(two.b, 2 * one.b)
         assert two.yy == pytest.approx(2 * one.yy)
-
-
-def test_sums_grow_at_the_columns_that_act() -> None:
-    rng = np.random.default_rng(0)
-    running, X, y = _Running(4), np.zeros((30, 4)), rng.normal(size=30)
-    X[:10][:, [0, 2]], X[10:][:, [3, 2]] = rng.normal(size=(10, 2)), rng.normal(size=(20, 2))
-    running.add(np.array([0, 2]), X[:10][:, [0, 2]], y[:10])
-    running.add(np.array([3, 2]), X[10:][:, [3, 2]], y[10:])
-    made, expected = running.moments(), Moments.of(X, y)
-    np.testing.assert_allclose(made.G, expected.G, atol=1e-12)
-    np.testing.assert_allclose(made.b, expected.b, atol=1e-12)
-    assert (made.yy, made.count) == (pytest.approx(expected.yy), 30.0)
 
 
 class TestTermsThatNothingExcites:

@@ -11,7 +11,8 @@ from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.design import Design
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.moments import Moments, Sums
-from armloop.util.arrays import Array, Index, Mask
+from armloop.regression.running import RunningMoments
+from armloop.util.arrays import Index, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +52,11 @@ class JointSums(Sums):
         """Sums of a chunk: shared columns, then all candidates of each joint's friction."""
         dealt = deal(chunk)
         sizes = [design.size + len(terms) for terms in candidates]
-        parts = [[_Running(size) for _ in range(dealt.count)] for size in sizes]
+        parts = [[RunningMoments(size) for _ in range(dealt.count)] for size in sizes]
         all_judge = bool(dealt.judges.all())
-        judges = parts if all_judge else [[_Running(size) for _ in range(dealt.count)] for size in sizes]
+        judges = (
+            parts if all_judge else [[RunningMoments(size) for _ in range(dealt.count)] for size in sizes]
+        )
         for columns in design.walk(chunk.samples, candidates):
             j, rows = columns.joint, slice(columns.first, columns.first + len(columns.X))
             label, y = dealt.label[rows, j], chunk.samples.tau[rows, j]
@@ -65,20 +68,3 @@ class JointSums(Sums):
                     judges[j][k].add(columns.where, columns.X[own], y[own])
         made = [[one.moments() for one in own] for own in parts]
         return JointSums(made, made if all_judge else [[one.moments() for one in own] for own in judges])
-
-
-class _Running:
-    """Moments that grow in place."""
-
-    def __init__(self, size: int) -> None:
-        self._G, self._b = np.zeros((size, size)), np.zeros(size)
-        self._yy = self._count = 0.0
-
-    def add(self, where: Index, X: Array, y: Array) -> None:
-        self._G[np.ix_(where, where)] += X.T @ X
-        self._b[where] += X.T @ y
-        self._yy += float(y @ y)
-        self._count += len(y)
-
-    def moments(self) -> Moments:
-        return Moments(self._G, self._b, self._yy, self._count)

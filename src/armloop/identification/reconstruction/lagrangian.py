@@ -8,9 +8,10 @@ look-alikes are exchanged for what they stood in for, and terms that became supe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
+from operator import iadd
 from typing import ClassVar
 
 import numpy as np
@@ -47,8 +48,9 @@ from armloop.identification.reconstruction.shared import (
 from armloop.identification.reconstruction.training import Survey, Training, fitted_rows
 from armloop.model.components import Lagrangian
 from armloop.regression.moments import Moments, Sums
+from armloop.regression.running import RunningMoments
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask
 from armloop.util.errors import ExcitationError
 from armloop.util.progress import Progress
 
@@ -63,7 +65,7 @@ _FLOOR = 1e-10
 #: Held-out nRMSE from which on a note says that the library may not suit.
 _POOR = 0.1
 #: Rows of the library evaluated at once.
-_CHUNK = 512
+_CHUNK = 256
 #: Place of the constant among a joint's friction.
 _OFFSET = [term.kind for term in FRICTION].index("offset")
 
@@ -85,7 +87,9 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     check_rank(training.survey.products(base.count), base)
     library = candidates(arm)
     progress(f"lagrangian: {library.count} candidates, {len(FRICTION) + 1} friction columns a joint")
-    chosen = _choose(library, data, constant_weights(arm))
+    fast = [sums[0] for sums in training.survey.sums.parts]
+    weights = np.array([part.count / max(part.yy, TINY) for part in fast])
+    chosen = _choose(library, data, weights, constant_weights(arm))
     energy = library.take(chosen)
     progress(f"lagrangian: {len(chosen)} terms chosen")
     design = Design(arm, energy.columns, energy.count)
@@ -165,83 +169,119 @@ def _warnings(errors: Array) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """Normal equations of each joint on the columns that act on it, to be added up with weights."""
+    """Normal equations of all joints together, the columns of the energies, then each joint's friction.
 
-    total: int
-    parts: list[tuple[Index, Moments]]
+    Attributes:
+        moments: a joint's squares count with its weight.
+        counts: (n,) samples of each joint.
+    """
 
-    def __add__(self, other: _Problem) -> _Problem:
-        pairs = zip(self.parts, other.parts, strict=True)
-        return _Problem(self.total, [(where, a + b) for (where, a), (_, b) in pairs])
+    moments: Moments
+    counts: Array
 
-    def weighted(self, weights: Array) -> Moments:
-        """Moments of all joints together; a joint's squares count ``weights`` times."""
-        G, b = np.zeros((self.total, self.total)), np.zeros(self.total)
-        yy = count = 0.0
-        for weight, (where, part) in zip(weights, self.parts, strict=True):
-            G[np.ix_(where, where)] += weight * part.G
-            b[where] += weight * part.b
-            yy += weight * part.yy
-            count += part.count
-        return Moments(G, b, yy, count)
+    @staticmethod
+    def of(library: EnergyTerms, samples: Samples, rows: Mask, weights: Array) -> _Problem:
+        """Of some samples (N, n), with weights (n,)."""
+        sums = RunningMoments(library.count + len(FRICTION) * samples.motion.joints)
+        for j, where, X, y in _walk(library, samples, rows):
+            sums.add(where, X, y, float(weights[j]))
+        return _Problem(sums.moments(), rows.sum(axis=0).astype(float))
 
-    def errors(self, theta: Array) -> Array:
-        """(n,) mean squared error of every joint, at least round-off."""
-        return np.array(
-            [max(p.squared_error(theta[where]), _FLOOR * p.yy) / max(p.count, 1.0) for where, p in self.parts]
-        )
+    def __iadd__(self, other: _Problem) -> _Problem:
+        """In place: a sum of its own would be as large again."""
+        own, more = self.moments, other.moments
+        np.add(own.G, more.G, out=own.G)
+        moments = Moments(own.G, own.b + more.b, own.yy + more.yy, own.count + more.count)
+        return _Problem(moments, self.counts + other.counts)
 
 
 @dataclass(frozen=True, eq=False)
-class _Problems(Sums):
+class _Problems:
     """What is fitted, and what decides how many terms there are."""
 
     fit: _Problem
     judge: _Problem
 
     @staticmethod
-    def of(chunk: Chunk, library: EnergyTerms) -> _Problems:
-        """Independent samples that slide fast."""
-        rows = fitted_rows(chunk) & fast_rows(chunk.samples) & chunk.independent[:, None]
-        judged = chunk.validation[:, None]
-        return _Problems(
-            _problem(library, chunk.samples, rows & ~judged), _problem(library, chunk.samples, rows & judged)
-        )
+    def of(chunk: Chunk, library: EnergyTerms, weights: Array) -> _Problems:
+        """Of the samples of a chunk."""
+        fit, judge = (_Problem.of(library, chunk.samples, rows, weights) for rows in _used(chunk))
+        return _Problems(fit, judge)
+
+    def __iadd__(self, other: _Problems) -> _Problems:
+        return _Problems(iadd(self.fit, other.fit), iadd(self.judge, other.judge))
 
 
-def _choose(library: EnergyTerms, data: Data, weights_of: Sequence[int]) -> Index:
+@dataclass(frozen=True, eq=False)
+class _Left(Sums):
+    """What chosen terms leave of each joint on the samples that are fitted, (n,) each."""
+
+    squares: Array
+    power: Array
+    counts: Array
+
+    @staticmethod
+    def of(chunk: Chunk, library: EnergyTerms, theta: Array) -> _Left:
+        """Of terms and friction with coefficients theta."""
+        rows = _used(chunk)[0]
+        squares, power = np.zeros((2, rows.shape[1]))
+        for j, where, X, y in _walk(library, chunk.samples, rows):
+            squares[j] += ((y - X @ theta[where]) ** 2).sum()
+            power[j] += y @ y
+        return _Left(squares, power, rows.sum(axis=0).astype(float))
+
+    @property
+    def errors(self) -> Array:
+        """(n,) mean squared error of every joint, at least round-off."""
+        return np.asarray(np.maximum(self.squares, _FLOOR * self.power) / np.maximum(self.counts, 1.0))
+
+
+def _used(chunk: Chunk) -> tuple[Mask, Mask]:
+    """(N, n) independent samples that slide fast: those that are fitted, and those that judge."""
+    rows = fitted_rows(chunk) & fast_rows(chunk.samples) & chunk.independent[:, None]
+    judged = chunk.validation[:, None]
+    return rows & ~judged, rows & judged
+
+
+def _choose(library: EnergyTerms, data: Data, weights: Array, weights_of: Sequence[int]) -> Index:
     """Indices of the terms to keep: chosen once with the joints weighted by torque, again by residual.
 
-    The constant force of joints ``weights_of`` is their weight, and no offset of their friction.
+    The products of thousands of candidates are as large as all else: they are added up with the weights, twice, and not
+    joint by joint.
+
+    Args:
+        weights: (n,) of each joint's squares, by its torque.
+        weights_of: joints whose constant force is their weight, and no offset of their friction.
     """
-    problems = data.sum(partial(_Problems.of, library=library), "normal equations of the candidates")
-    fit, judge, n = problems.fit, problems.judge, len(library.revolute)
-    for j, (_, part) in enumerate(fit.parts):
-        if part.count == 0:
-            raise ExcitationError(f"q{j + 1}: no sample that is fitted slides fast enough to choose terms by")
+    n = len(library.revolute)
     lifts = library.potential & (np.abs(library.degrees).sum(axis=1) == 1)
     lifts &= (library.degrees[:, weights_of] == 1).any(axis=1)
     offsets = library.count + len(FRICTION) * np.array(weights_of, dtype=int)
-    friction = np.setdiff1d(np.arange(library.count, fit.total), offsets + _OFFSET)
+    friction = np.setdiff1d(np.arange(library.count, library.count + len(FRICTION) * n), offsets + _OFFSET)
     forced = np.concatenate([np.arange(n), np.flatnonzero(lifts), friction])
-    weights = np.array([part.count / part.yy for _, part in fit.parts])
-    support = forced
-    for _ in range(2):
-        problem = fit.weighted(weights)
-        support = _greedy(problem, judge.weighted(weights), forced, library.count)
-        theta = np.zeros(fit.total)
-        theta[support] = problem.solve(support)
-        weights = 1 / fit.errors(theta)
+
+    def chosen(weights: Array) -> tuple[Index, Array]:
+        """Terms with the joints so weighted, and their coefficients."""
+        sums = partial(_Problems.of, library=library, weights=weights)
+        problems = reduce(iadd, data.map(sums, "normal equations of the candidates"))
+        fit, judge = problems.fit.moments, problems.judge.moments
+        for j in np.flatnonzero(problems.fit.counts == 0):
+            raise ExcitationError(f"q{j + 1}: no sample that is fitted slides fast enough to choose terms by")
+        support = _greedy(fit, judge, forced, library.count)
+        return support, fit.refitted(support)
+
+    support, theta = chosen(weights)
+    few = support[support < library.count]
+    left = partial(
+        _Left.of, library=library.take(few), theta=theta[[*few, *range(library.count, len(theta))]]
+    )
+    support, _ = chosen(1 / data.sum(left, "what the first choice leaves").errors)
     return np.sort(support[support < library.count])
 
 
-def _problem(library: EnergyTerms, samples: Samples, rows: Mask) -> _Problem:
+def _walk(library: EnergyTerms, samples: Samples, rows: Mask) -> Iterator[tuple[int, Index, Array, Array]]:
+    """Each joint with the places of the columns that act on it, their values at some of the rows (N, n), and its torque."""
     motion, acts, p, f = as_torque(samples).motion, library.acts, library.count, len(FRICTION)
-    wheres = [
-        np.concatenate([np.flatnonzero(acts[j]), np.arange(p + f * j, p + f * (j + 1))])
-        for j in range(motion.joints)
-    ]
-    sums = [Moments.none(len(w)) for w in wheres]
     friction = [
         smooth(samples, np.column_stack([term.column(samples.motion, j) for term in FRICTION]))
         for j in range(motion.joints)
@@ -250,11 +290,11 @@ def _problem(library: EnergyTerms, samples: Samples, rows: Mask) -> _Problem:
     for start in range(0, len(used), _CHUNK):
         index = used[start : start + _CHUNK]
         columns = library.columns(motion.take(index))
-        for j, where in enumerate(wheres):
-            own = rows[index, j]
-            X = np.hstack([columns[own, j][:, where[: len(where) - f]], friction[j][index[own]]])
-            sums[j] = sums[j] + Moments.of(X, samples.tau[index[own], j])
-    return _Problem(p + f * motion.joints, list(zip(wheres, sums, strict=True)))
+        for j in range(motion.joints):
+            own, acting = rows[index, j], np.flatnonzero(acts[j])
+            where = np.concatenate([acting, np.arange(p + f * j, p + f * (j + 1))])
+            X = np.hstack([columns[own, j][:, acting], friction[j][index[own]]])
+            yield j, where, X, samples.tau[index[own], j]
 
 
 def _greedy(fit: Moments, judge: Moments, forced: Index, count: int) -> Index:

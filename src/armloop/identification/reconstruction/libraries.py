@@ -41,6 +41,8 @@ from armloop.util.errors import InputError
 LIBRARIES: dict[str, Library] = {
     one.name: one for one in (DoubleFeatureSetLibrary(), RigidBodyLibrary(), LagrangianLibrary())
 }
+#: A library that leaves so many times as much as the one taken stays behind, whatever else is found out about the logs.
+_FAR = 3.0
 #: Blocks from which on a difference has a standard error.
 _ENOUGH = 8
 
@@ -235,6 +237,12 @@ def choose(tried: Sequence[Contender]) -> list[Contender]:
     simpler = [one for one in eligible if one.complexity < best.complexity and _no_worse(one, best)]
     taken = min(simpler, key=lambda one: one.complexity, default=best)
     return [replace(one, chosen=one is taken) for one in tried]
+
+
+def left_behind(tried: Sequence[Contender]) -> list[Contender]:
+    """Those of several, one of them chosen, that leave so much more than it that they need not be tried again."""
+    (taken,) = [one for one in tried if one.chosen]
+    return [one for one in tried if one.attempt is not None and one.error > _FAR * taken.error]
 
 
 def _no_worse(one: Contender, best: Contender) -> bool:

@@ -30,6 +30,7 @@ from armloop.identification.reconstruction.libraries import (
     choose,
     comparison_notes,
     contender,
+    left_behind,
     named,
 )
 from armloop.identification.reconstruction.library import METHODS, REFERENCE, Library
@@ -233,7 +234,7 @@ def reconstruct(
             )
         if again is not None or shared:
             view = partial(without_shared_standstill, model=seen) if shared else None
-            tried, part = _compared(wanted, refused, partial(attempt, view=view), ready)
+            tried, part = _compared(wanted, refused, partial(attempt, view=view), ready, left_behind(tried))
             _find_ripple(_chosen(tried), ready.logs)
     return _finished(tried, part, method, ready, progress, recorded)
 
@@ -245,17 +246,25 @@ def _refused(arm: Arm, wanted: Sequence[Library], ready: Prepared) -> dict[Libra
 
 
 def _compared(
-    wanted: Sequence[Library], refused: dict[Library, str], attempt: Callable[..., Attempt], ready: Prepared
+    wanted: Sequence[Library],
+    refused: dict[Library, str],
+    attempt: Callable[..., Attempt],
+    ready: Prepared,
+    behind: Sequence[Contender] = (),
 ) -> tuple[list[Contender], Part]:
-    """What each library comes to, one of them chosen, and the part of the held-out blocks that judges it."""
-    left = [one for one in wanted if one not in refused]
-    tried = [Contender(one, refused=why) for one, why in refused.items()]
-    if len(left) == 1:
+    """What each library comes to, one of them chosen, and the part of the held-out blocks that judges it.
+
+    Args:
+        behind: what was tried before and is not tried again.
+    """
+    left = [one for one in wanted if one not in refused and one not in [each.library for each in behind]]
+    tried = [*(Contender(one, refused=why) for one, why in refused.items()), *behind]
+    if len(left) == 1 and not behind:
         made = attempt(left[0])
         tried.append(Contender(left[0], made, coefficients=made.coefficients(), chosen=True))
         return sorted(tried, key=lambda one: wanted.index(one.library)), "all"
     # half of the held-out blocks may be too few to judge by; a fold of the others then chooses the library
-    few = len(left) > 1 and ready.few_held_out(wanted[0].conditioning)
+    few = len(left) + len(behind) > 1 and ready.few_held_out(wanted[0].conditioning)
     tried = choose([*tried, *(contender(one, partial(attempt, nested=few)) for one in left)])
     tried.sort(key=lambda one: wanted.index(one.library))
     if few:
