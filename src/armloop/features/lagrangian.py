@@ -15,14 +15,17 @@ What can occur in a chain of rigid links, and therefore is a candidate:
 - M_ij is of first degree (|k| <= 1, q_p) in the joints from i + 1 to j, which only turn one axis against the other,
   and of second degree (|k| <= 2, q_p^2) in those beyond j, which shape the inertia they carry.
 - U is of first degree in every joint, and free of q_1 where gravity does not see that joint move.
+- Neighbouring joints with parallel axes turn what lies beyond by the sum of their angles (the difference, of axes that
+  point against each other): a link's direction is a wave of q_a + … + q_m, from the first joint a of the parallel ones.
+  U, which is linear in the directions of the links, has one such sum of them, T two, added or subtracted. Two parallel axes
+  have no weight of cos(q_1 - q_2), whatever their links are.
 
 Up to four joints this is all there is. Beyond, a term of T reaches over at most three neighbouring joints, or
 over four if all of them take part and the degree does not rise outwards (a short lever turned by a long one);
 terms that reach further exist, but are products of more offsets than arms have large ones.
 
-Waves are sparse where axes are parallel (angles add up, as in SCARA and UR arms). Where every axis crosses the
-one before, a single product of sines is a sum of many waves: seven such joints need more terms, and far more
-data, than base parameters do.
+Waves are sparse where axes are parallel, as in SCARA and UR arms. Where every axis crosses the one before, a single
+product of sines is a sum of many waves: seven such joints need more terms, and far more data, than base parameters do.
 """
 
 from __future__ import annotations
@@ -44,6 +47,8 @@ from armloop.util.arrays import Array, Index, Mask
 _CHUNK = 256
 #: Neighbouring joints that any term of T may reach over, and those that a term may if its degree falls outwards.
 _REACH, _FALLING_REACH = 3, 4
+#: Cosine of the angle between axes that count as parallel: those of a calibrated URDF are some thousandths of a radian off.
+_PARALLEL = float(np.cos(0.02))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,25 +163,30 @@ class EnergyTerms:
 
 
 def candidates(arm: Arm) -> EnergyTerms:
-    """All candidates for an arm's structure (joint kinds, base joint and gravity; no lengths, no masses).
+    """All candidates for an arm's structure (joint kinds, directions of axes and gravity; no lengths, no masses).
 
     The first n are the constant inertias v_i^2 of the joints: every joint has one.
     """
     n, revolute = arm.n, arm.revolute
     rows: list[tuple[tuple[int, ...], bool, tuple[int, int]]] = []
+    parallel = parallel_axes(arm)
     none = (0,) * n
     rows += [(none, False, (j, j)) for j in range(n)]
     for i in range(n):
         for j in range(i, n):
             limits = [0] * (i + 1) + [1] * (j - i) + [2] * (n - 1 - j)
             for degrees in _degrees(limits, revolute):
-                if (degrees != none or i != j) and _within_reach(degrees, n):
+                if (
+                    (degrees != none or i != j)
+                    and _within_reach(degrees, n)
+                    and _turns(degrees, parallel) <= 2
+                ):
                     rows += [(degrees, sine, (i, j)) for sine in _phases(degrees, revolute)]
     if arm.gravity.any():
         limits = [1] * n
         limits[0] = int(gravity_sees_first_joint(arm))
         for degrees in _degrees(limits, revolute):
-            if degrees != none:
+            if degrees != none and _turns(degrees, parallel) <= 1:
                 rows += [(degrees, sine, (-1, -1)) for sine in _phases(degrees, revolute)]
     return EnergyTerms(
         np.asarray(revolute, dtype=bool),
@@ -199,6 +209,35 @@ def _phases(degrees: tuple[int, ...], revolute: Mask) -> tuple[bool, ...]:
     """Cosine and sine, but only the cosine (one) where no revolute joint takes part."""
     waves = any(k for k, turns in zip(degrees, revolute, strict=True) if turns)
     return (False, True) if waves else (False,)
+
+
+def parallel_axes(arm: Arm) -> list[dict[int, int]]:
+    """Revolute joints (0-based) in runs with parallel axes, each with 1, or -1 where its axis points against the first's."""
+    found: list[tuple[dict[int, int], Array]] = []
+    R = np.eye(3)
+    for j in range(arm.n):
+        R = R @ arm.X_PF[j, :3, :3]
+        axis = R @ arm.axis[j]
+        along = float(found[-1][1] @ axis) if found else 0.0
+        if not arm.revolute[j]:
+            continue
+        if abs(along) > _PARALLEL:
+            found[-1][0][j] = 1 if along > 0 else -1
+        else:
+            found.append(({j: 1}, axis))
+    return [run for run, _ in found]
+
+
+def _turns(degrees: tuple[int, ...], parallel: list[dict[int, int]]) -> int:
+    """How many directions of links a wave is a product of, at the most in one run of parallel joints.
+
+    Sums of the angles from the first joint of a run on, added or subtracted: each ends at one joint.
+    """
+    most = 0
+    for run in parallel:
+        own = [sign * degrees[j] for j, sign in run.items()]
+        most = max(most, sum(abs(one - beyond) for one, beyond in zip(own, [*own[1:], 0], strict=True)))
+    return most
 
 
 def _within_reach(degrees: tuple[int, ...], n: int) -> bool:
