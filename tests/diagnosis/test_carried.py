@@ -24,7 +24,10 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.load_direction import pulls_down
 from armloop.diagnosis.next_run import next_run
 from armloop.laws.effects import Context, effect, hypotheses
+from armloop.laws.effects.carried_load import CarriedLoad
+from armloop.laws.effects.onset import Onset
 from armloop.laws.effects.payload import Payload
+from armloop.laws.effects.spells import Interval
 from armloop.model import ReconstructedModel
 from armloop.reports.findings import findings
 from armloop.robot.kinematics import tool_jacobian
@@ -365,3 +368,33 @@ def test_the_account_with_a_load_is_one_of_the_model_as_it_is(
     assert [each.effect.name for each in found.outcome.found] == ["carried_load"]
     left = np.sqrt(np.mean((found.remaining() / whole.scale)[found.evidence.rows] ** 2))
     assert left < 1.5 < np.sqrt(np.mean((whole.residual([]) / whole.scale)[found.evidence.rows] ** 2)) / 2
+
+
+@pytest.mark.parametrize(
+    ("times", "word", "instant"),
+    [
+        ((12.0, 29.9), "since", 12.0),
+        ((0.1, 12.0), "until", 12.0),
+        ((5.0, 12.0), "", 0.0),
+        ((0.1, 29.9), "", 0.0),
+    ],
+)
+def test_a_load_that_nobody_saw_put_down_is_a_payload_since_then(
+    times: tuple[float, float], word: str, instant: float
+) -> None:
+    """Nor picked up: it was there until it was put down."""
+    log = run(1, [])
+    motion = preprocess([log], model_with_baseline().conditioning).motion
+    at = int(np.argmin(np.abs(motion.time - times[0])))
+    load = CarriedLoad(intervals=(Interval(*times, tuple(motion.q[at].tolist())),), error=0.1)
+    stated = carrying._stated(load, motion, [log])
+    if not word:
+        assert stated.effect is load
+        return
+    onset = stated.effect.onset
+    assert stated.effect.name == "payload" and isinstance(onset, Onset)
+    assert (onset.word, onset.time, onset.error, onset.log) == (word, instant, 0.1, "run1")
+    then = int(np.argmin(np.abs(motion.time - instant)))
+    assert onset.posture == tuple(motion.q[then].tolist())
+    twice = CarriedLoad(intervals=(Interval(1.0, 2.0, load.intervals[0].posture), *load.intervals))
+    assert carrying._stated(twice, motion, [log]).effect is twice

@@ -33,24 +33,28 @@ def test_an_event_of_no_more_than_twice_what_nothing_accounts_for_at_other_times
         after=np.array([np.sqrt(13.0), 1.0]),
     )
     is_drowned, model = event_significance.drowned, 1.0
-    assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    assert not is_drowned(evidence, model, contact)
     left[110:120] = 2 * np.sqrt(5.6)
-    assert is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    assert is_drowned(evidence, model, contact)
     # another joint's is none, nor what is accounted for, nor less than twice the baseline
-    assert not is_drowned(evidence, model, contact, [1])  # type: ignore[arg-type]
-    assert not is_drowned(evidence, 0.85, contact, [0, 1])  # type: ignore[arg-type]
+    contact.before, contact.after = contact.before[::-1], contact.after[::-1]
+    left[110:120, 1] = 4.4
+    assert not is_drowned(evidence, model, contact)
+    contact.before, contact.after = contact.before[::-1], contact.after[::-1]
+    left[110:120, 1] = 2 * np.sqrt(5.6)
+    assert not is_drowned(evidence, 0.85, contact)
     left[:110] = left[120:] = 3.5
-    assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    assert not is_drowned(evidence, model, contact)
     # as long as the event, in one run, and beyond the baseline
     left[:110], left[120:] = 4.4, 4.4
     left[115] = 3.0
-    assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    assert not is_drowned(evidence, model, contact)
     # as much of it, but the joint dwells in between: as many samples that count are as long
     left[105:130] = 2 * np.sqrt(5.6)
     rows[105:130:2] = False
-    assert is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    assert is_drowned(evidence, model, contact)
     left[110:120], left[95:105] = 4.4, 2 * np.sqrt(5.6)
-    assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    assert not is_drowned(evidence, model, contact)
 
 
 def test_an_event_is_told_from_a_law_where_a_joint_leaves_twice_what_it_leaves_at_other_times() -> None:

@@ -103,11 +103,13 @@ def test_parallel_axes_turn_by_sums_of_their_angles() -> None:
     """Two parallel axes have weights of q1 and of q1 + q2 (q1 - q2, of opposite ones), and T of q2 alone."""
     arm = replace(longer(load_arm("three_axis"), 2), gravity=np.array([0.0, -9.81, 0.0]))
     arm = replace(arm, X_PF=np.tile(np.eye(4), (2, 1, 1)))
-    for second, wave in (([0.0, 0.0, 1.0], "q1 + q2"), ([0.001, 0.0, -1.0], "q1 - q2")):
+    for second, wave in (([0.0, 0.0, 1.0], "q1 + q2"), ([0.001, 0.0, -np.sqrt(1 - 1e-6)], "q1 - q2")):
         library = candidates(replace(arm, axis=np.array([[0.0, 0.0, 1.0], second])))
         weights = [name for name, of in zip(library.names, library.potential, strict=True) if of]
         assert sorted(weights) == sorted(["cos(q1)", "sin(q1)", f"cos({wave})", f"sin({wave})"])
-    assert parallel_axes(replace(arm, axis=np.array([[0.0, 0.0, 1.0], [0.03, 0.0, 1.0]]))) == [{0: 1}, {1: 1}]
+    assert parallel_axes(
+        replace(arm, axis=np.array([[0.0, 0.0, 1.0], [0.03, 0.0, np.sqrt(1 - 0.03**2)]]))
+    ) == [{0: 1}, {1: 1}]
     ur = load_arm("scara")
     assert parallel_axes(ur) == [{0: 1, 1: 1, 3: 1}]
 

@@ -8,8 +8,12 @@ carried, all samples say; how heavy it is, only those outside the fold that is j
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
 from armloop.data.signals import smooth
 from armloop.diagnosis.account import Account
 from armloop.diagnosis.beside import (
@@ -25,11 +29,13 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import MOSTLY, much_is_left
 from armloop.diagnosis.load_direction import pulls_down
+from armloop.diagnosis.onset import log_name
 from armloop.diagnosis.outcomes import Found
 from armloop.diagnosis.search import ROUNDS
 from armloop.diagnosis.trials import Known
 from armloop.diagnosis.two_states import intervals_of, two_states
 from armloop.laws.effects.carried_load import CarriedLoad
+from armloop.laws.effects.onset import Onset, log_of, passes
 from armloop.laws.effects.payload import Payload
 from armloop.regression.embedded import solve
 from armloop.util.arrays import Mask
@@ -37,12 +43,17 @@ from armloop.util.progress import Progress
 
 
 def account_with_load(
-    whole: Evidence, account: Account, progress: Progress, jobs: int | None
+    whole: Evidence,
+    account: Account,
+    progress: Progress,
+    jobs: int | None,
+    logs: Sequence[MotionLog] = (),
 ) -> Account | None:
     """The account of a run in which a load is carried at times; None where that leaves no far less.
 
     Args:
         account: that without such a load.
+        logs: the run's, whose names are stated.
     """
     if not _is_asked(account):
         return None
@@ -77,8 +88,29 @@ def account_with_load(
             break
     if not _explains_most(_excess(other, other.whole.rows), account, other.whole.rows):
         return None
-    loaded = merged(whole, [_found(load)], other)
+    loaded = merged(whole, [_stated(load, whole.samples.motion, logs)], other)
     return None if at_the_cost_of_others(account, loaded) else loaded
+
+
+def _stated(load: CarriedLoad, motion: Motion, logs: Sequence[MotionLog]) -> Found:
+    """The load as an effect; one that its run's end keeps from being put down, or its beginning from being picked up, is a
+    payload since, or until, an instant.
+    """
+    if len(load.intervals) != 1:
+        return _found(load)
+    (own,), near = load.intervals, 2 * load.error
+    run = next((r for r in motion.runs() if passes(motion, r, own.start, np.asarray(own.posture))), None)
+    if run is None:
+        return _found(load)
+    log = log_of(motion, run)
+    time, q = motion.time[log], motion.q[log]
+    until, for_good = own.start - time[0] <= near, time[-1] - own.end <= near
+    if until == for_good:
+        return _found(load)
+    instant = own.end if until else own.start
+    posture = tuple(q[int(np.argmin(np.abs(time - instant)))].tolist())
+    onset = Onset(instant, load.error, until, posture, log=log_name(logs, instant, posture))
+    return Found(Payload().within(onset), Shape.fixed(0.0), 0.0)
 
 
 def _excess(account: Account, rows: Mask) -> float:

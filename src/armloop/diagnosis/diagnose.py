@@ -154,7 +154,7 @@ def _judged(
     progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
     with Hypotheses(whole, jobs) as panel:
         account = best_account(whole, contacts, progress, panel)
-    account = account_with_load(whole, account, progress, jobs) or account
+    account = account_with_load(whole, account, progress, jobs, logs) or account
     account = account_with_cable(whole, account, progress, jobs) or account
     account = account_with_spells(whole, account, logs, progress, jobs) or account
     account = account_with_onsets(account, logs, progress, jobs)
@@ -255,13 +255,9 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             outcome = without_effect(evidence, outcome, doubtful)
             contacts = account.without_effect(outcome).contacts
             continue
-        # a residual without a law is all there, though the verdict names it
-        rest = (*stand.left, *(law.joint - 1 for law in laws if not law.parameters))
         slides = evidence.only(sliding)
         unclear = [each for each in contacts if each.clear < CHANCE]
-        drowning = [
-            each for each in contacts if each not in unclear and drowned(slides, augmented, each, rest)
-        ]
+        drowning = [each for each in contacts if each not in unclear and drowned(slides, augmented, each)]
         if not drowning and not unclear:
             break
         doubted += [event_unclear(each.added, each.clear) for each in unclear]

@@ -43,19 +43,18 @@ def told(whole: Evidence, evidence: Evidence, contact: Contact, laws: Sequence[E
     return any(stands_out(j) for j in contact.shown)
 
 
-def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joints: Sequence[int]) -> bool:
+def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact) -> bool:
     """Whether an event removes no more than twice what is left, outside of all events, of some stretch that is as long.
 
     Of a residual that nothing accounts for the highest peaks look like events, and others are hardly lower.
 
     As long in samples that count: where the joint rests nothing is left to see, in a program with dwells of any stretch.
-    Each joint counts by its part of what the event removes, as for effects that an unknown rest outweighs.
+    Each joint counts by its part of what the event removes, as for effects that an unknown rest outweighs, and where less
+    than twice the baseline is left it does not; noise that is more than that has peaks like any other rest.
 
     Args:
         evidence: the run without its events.
         model: that with the effects found.
-        joints: those (0-based) of which something real is left that nothing accounts for; less than twice the baseline
-            does not count.
     """
     motion, kept, rows = evidence.samples.motion, evidence.independent, evidence.rows
     left = (np.where(rows, evidence.left_by(model), 0.0)[kept] / evidence.scale) ** 2
@@ -64,7 +63,7 @@ def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joi
     length = max(int((contact.rows[kept] & (time >= start) & (time <= end)).sum()), 1)
     removed = np.maximum(contact.before**2 - contact.after**2, 0.0) / evidence.scale**2
     rest = np.zeros(len(removed))
-    for j in joints:
+    for j in range(len(removed)):
         if left[:, j].sum() < MULTIPLE**2 * rows[:, j].sum():
             continue
         for run in motion.runs():

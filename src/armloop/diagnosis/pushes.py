@@ -19,6 +19,7 @@ from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import interval
+from armloop.laws.effects.external_contact import size_of_force
 from armloop.model import AddedEffect
 from armloop.util.arrays import TINY, Array, Index, Mask
 
@@ -159,8 +160,15 @@ def push(
     # the joints beyond another link feel nothing of what pushes that
     beyond = force if chosen.link in (0, n) or held > most + FREEDOM else None
     # what one joint alone shows may be due to a force on any link from that on
-    alone = [kind.effect.joint for _, kind in equals if kind.effect.joint is not None]
-    return _somewhere(best, anywhere, beyond, min(alone, default=None))
+    alone = {kind.effect.joint: trial for trial, kind in equals if kind.effect.joint is not None}
+    found = _somewhere(best, anywhere, beyond, min(alone, default=None))
+    strength = size_of_force(found.added.parameters["force"])
+    if not alone or number(strength.value) > number(strength.std_error):
+        return found
+    # a force of which next to nothing is known tells less than the torque that it asks of the joint
+    torque = max(alone.values(), key=lambda trial: trial.share)
+    others = [rival for rival in best.rivals if rival[0].place != torque.added.effect.place]
+    return replace(torque, rivals=[(best.added.effect, best.share), *others])
 
 
 def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, joint: int) -> Contact | None:

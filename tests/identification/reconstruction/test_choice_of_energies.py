@@ -159,6 +159,9 @@ class Faked:
         self.asked += 1
         return self.left, np.full(len(others), self.gain)
 
+    def losses(self, support: Any) -> Any:
+        return self.left, np.ones(len(support))
+
     def solve(self, support: Any) -> Any:
         return support
 
@@ -184,6 +187,23 @@ class TestGreedySearch:
         ):
             self.search(fit, lambda size: 1.0 if size < 3 else 0.5)
             assert fit.asked == asked
+
+    def test_what_stood_in_for_others_goes_once_they_are_there(self) -> None:
+        """The torque is the sum of two columns; a third, which is nearly that sum, is taken first, and left again."""
+        rng = np.random.default_rng(0)
+        X = rng.normal(size=(400, 6))
+        y = X[:, 0] + X[:, 1]
+        X[:, 2] = y + 0.5 * rng.normal(size=400)
+        fit, judge = Moments.of(X[:200], y[:200]), Moments.of(X[200:], y[200:])
+        assert fit.gains(NONE)[1].argmax() == 2
+        assert sorted(lagrangian._greedy(fit, judge, NONE, 6).tolist()) == [0, 1]
+
+    def test_forced_columns_stay(self) -> None:
+        rng = np.random.default_rng(0)
+        X = rng.normal(size=(400, 6))
+        y = X[:, 0] + X[:, 1]
+        fit, judge = Moments.of(X[:200], y[:200]), Moments.of(X[200:], y[200:])
+        assert lagrangian._greedy(fit, judge, np.array([4]), 4).tolist()[0] == 4
 
     def test_no_error_is_less_than_round_off(self) -> None:
         assert self.search(Faked(), lambda size: [1.0, 0.9e-8, 0.0][min(size, 2)]) == [0]

@@ -13,7 +13,6 @@ from armloop.data.motion import Motion
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import lagrangian, rigid_body
 from armloop.identification.reconstruction.found import Found
-from armloop.identification.reconstruction.lagrangian import _Problem
 from armloop.identification.reconstruction.sums import StepSums
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.moments import Moments
@@ -43,34 +42,6 @@ def moments(size: int, seed: int, samples: int = 20) -> tuple[Any, Any, Moments]
     return X, y, Moments.of(X, y)
 
 
-def test_joints_are_added_with_their_weights_where_their_columns_stand() -> None:
-    (X, y, one), (Z, z, other) = moments(2, 0), moments(3, 1, 30)
-    problem = _Problem(4, [(np.array([0, 2]), one), (np.array([1, 2, 3]), other)])
-    A, B = np.zeros((20, 4)), np.zeros((30, 4))
-    A[:, [0, 2]], B[:, [1, 2, 3]] = X, Z
-    found = problem.weighted(np.array([2.0, 0.5]))
-    np.testing.assert_allclose(found.G, 2 * A.T @ A + B.T @ B / 2, atol=1e-12)
-    np.testing.assert_allclose(found.b, 2 * A.T @ y + B.T @ z / 2, atol=1e-12)
-    assert (found.yy, found.count) == (pytest.approx(2 * y @ y + z @ z / 2), 50.0)
-    theta = np.array([0.3, -0.2, 0.5, 0.1])
-    np.testing.assert_allclose(
-        problem.errors(theta), [np.mean((y - A @ theta) ** 2), np.mean((z - B @ theta) ** 2)]
-    )
-    twice = problem + problem
-    assert twice.total == 4 and [where.tolist() for where, _ in twice.parts] == [[0, 2], [1, 2, 3]]
-    np.testing.assert_allclose(twice.weighted(np.ones(2)).G, 2 * problem.weighted(np.ones(2)).G)
-
-
-def test_an_error_is_round_off_at_least_and_of_no_sample_nothing() -> None:
-    X, _, _ = moments(2, 0)
-    beta = np.array([1.0, 2.0])
-    exact = Moments.of(X, X @ beta)
-    none = Moments(np.zeros((2, 2)), np.zeros(2), 0.0, 0.0)
-    both, one = np.array([0, 1]), Moments.of(X[:1], X[:1] @ beta + 3.0)
-    found = _Problem(2, [(both, exact), (both, none), (both, one)]).errors(beta)
-    assert found == pytest.approx([1e-10 * exact.yy / 20, 0.0, 9.0], rel=1e-3)
-
-
 def test_energies_that_leave_a_tenth_of_the_torque_are_named() -> None:
     for errors in ([0.05, 0.15, np.nan], [np.nan] * 3):
         assert lagrangian._warnings(np.array(errors)) == []
@@ -86,6 +57,9 @@ def test_the_search_of_energies_ends_after_eight_additions_without_a_gain(
 
     class Fit:
         yy = 1.0
+
+        def losses(self, support: Any) -> Any:
+            return 1.0, np.ones(len(support))
 
         def gains(self, support: Any, others: Any) -> Any:
             asked.append(len(support))

@@ -354,6 +354,7 @@ def test_a_model_keeps_errors_where_they_belong_and_none_that_is_no_number(
         ],
         covariance="covariance",
         gram="gram",
+        heterogeneity=SimpleNamespace(usual=2.0),
         undetermined=lambda: ["one"],
     )
     second = SimpleNamespace(**vars(first))
@@ -379,4 +380,4 @@ def test_a_model_keeps_errors_where_they_belong_and_none_that_is_no_number(
     assert kept["undetermined"] == ["one", "one"] and kept["stribeck"] == ["law 0", "law 1"]
     assert kept["friction_line"] == ["line 0 [True, False]", "line 1 [False, True]"]
     assert kept["torque"] == [(4, "covariance", "gram"), (2, "covariance", "gram")]
-    assert (kept["block_seconds"], kept["correlation_seconds"]) == (7.0, 0.5)
+    assert (kept["block_seconds"], kept["correlation_seconds"], kept["heterogeneity"]) == (7.0, 0.5, 2.0)

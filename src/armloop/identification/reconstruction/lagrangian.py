@@ -1,9 +1,9 @@
 """The Lagrangian library: few terms of the kinetic and the potential energy, shared by all joints.
 
 Where the double feature set looks for terms of every joint's torque, this looks for terms of the energies,
-which are far fewer, and every one of them is seen by several joints at once. Terms are added greedily, the
-one that lowers the weighted residual of all joints most, for as long as data that are not fitted gain; then
-look-alikes are exchanged for what they stood in for, and terms that became superfluous are dropped.
+which are far fewer, and every one of them is seen by several joints at once. Terms are added by sequential floating
+forward selection, the one that lowers the weighted residual of all joints most, for as long as data that are not fitted
+gain; then look-alikes are exchanged for what they stood in for, and terms that became superfluous are dropped.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def _warnings(errors: Array) -> list[str]:
         return []
     return [
         f"held-out nRMSE {error:.2f}: the waves of the Lagrangian library do not suit this arm or these data "
-        "(axes that cross need more terms than short logs tell apart); try --library rigid-body"
+        "(axes that cross need more terms than short logs tell apart)"
     ]
 
 
@@ -298,26 +298,49 @@ def _walk(library: EnergyTerms, samples: Samples, rows: Mask) -> Iterator[tuple[
 
 
 def _greedy(fit: Moments, judge: Moments, forced: Index, count: int) -> Index:
-    """Forced columns and those of the first ``count`` that held-out data welcome, one after the other."""
+    """Forced columns and those of the first ``count`` that held-out data welcome: sequential floating forward selection.
+
+    After each addition the weakest go for as long as what is left fits better than any set of that size before: a term taken
+    early stood in for several that come later (Pudil, Novovičová and Kittler, Pattern Recognition Letters 15, 1994).
+    """
 
     def held_out(support: Index) -> float:
         return max(judge.squared_error(fit.solve(support), support), _FLOOR * judge.yy)
 
-    support, others = forced, np.arange(count)
-    path, errors = [support], [held_out(support)]
-    while len(path) <= _MOST and len(path) - 1 - int(np.argmin(errors)) < _PATIENCE:
+    others, fixed, support = np.arange(count), len(forced), forced
+    # by the number of terms beside the forced ones: the best set, what it leaves, and what it leaves of held-out data
+    best, left, errors = {0: forced}, dict[int, float](), {0: held_out(forced)}
+
+    def better(support: Index, rss: float) -> bool:
+        size = len(support) - fixed
+        if size in best and rss >= (1 - _WORTH_A_SWAP) * left.get(size, 0.0) - _FLOOR * fit.yy:
+            return False
+        best[size], left[size], errors[size] = support, rss, held_out(support)
+        return True
+
+    while len(best) <= _MOST and len(best) - 1 - min(errors, key=errors.__getitem__) < _PATIENCE:
         rss, gains = fit.gains(support, others)
         gains[np.isin(others, support)] = 0.0
-        best = int(np.argmax(gains))
-        if gains[best] <= 0 or rss <= _FLOOR * fit.yy:
+        place = int(np.argmax(gains))
+        if gains[place] <= 0 or rss <= _FLOOR * fit.yy:
             break
-        support = np.append(support, others[best])
-        path.append(support)
-        errors.append(held_out(support))
-    enough = _GOOD_ENOUGH * min(errors)
-    support = _swap(fit, path[int(np.argmax(np.array(errors) <= enough))], len(forced), others)
+        support = np.append(support, others[place])
+        if not better(support, rss - gains[place]):
+            support = best[len(support) - fixed]
+        while len(support) > fixed + 1:
+            rss, losses = fit.losses(support)
+            losses[:fixed] = np.inf
+            weakest = int(np.argmin(losses))
+            shorter = np.delete(support, weakest)
+            if not better(shorter, rss + losses[weakest]):
+                break
+            support = shorter
+    sizes = sorted(best)
+    enough = _GOOD_ENOUGH * min(errors.values())
+    support = best[next(size for size in sizes if errors[size] <= enough)]
+    support = _swap(fit, support, fixed, others)
     support = _prune(fit, support, forced, held_out, min(enough, _GOOD_ENOUGH * held_out(support)))
-    return _swap(fit, support, len(forced), others)
+    return _swap(fit, support, fixed, others)
 
 
 def _swap(fit: Moments, support: Index, fixed: int, others: Index) -> Index:

@@ -62,7 +62,7 @@ class ExternalContact(Effect):
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         start, end, force = (parameters[key] for key in ("start", "end", "force"))
-        size = _size(force).words(3)
+        size = size_of_force(force).words(3)
         at = ", ".join(f"{x:.1f}" for x in np.asarray(force.value))
         where = (
             f"link {number(parameters['link'].value):.0f} at its far end"
@@ -78,7 +78,7 @@ class ExternalContact(Effect):
         )
 
 
-def _size(force: Estimate) -> Estimate:
+def size_of_force(force: Estimate) -> Estimate:
     """A force's size, and its standard error along the force (linear error propagation)."""
     components, errors = np.asarray(force.value, dtype=float), np.broadcast_to(force.std_error, 3)
     size = float(np.linalg.norm(components))
