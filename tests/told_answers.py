@@ -155,7 +155,7 @@ class Answers:
             without_effect=lambda outcome: SimpleNamespace(contacts=contacts[:1]),
         )
 
-    def loaded(self, whole: Evidence, account: Any, progress: Any, jobs: int | None) -> Any:
+    def loaded(self, whole: Evidence, account: Any, progress: Any, jobs: int | None, logs: Any) -> Any:
         self.asked["carried"] = (whole.name, account.outcome.name, jobs)
         if not self.given["carried"]:
             return None

@@ -14,11 +14,14 @@ from synthetic import three_axis
 from armloop.data.motion import Motion
 from armloop.diagnosis import pushes
 from armloop.diagnosis.event_size import event_size_error
-from armloop.laws.effects import effect
+from armloop.laws.effects import Estimate, effect
 from armloop.robot.arm import load_arm
 from armloop.util.arrays import TINY
 
 Shares = dict[str, float]
+
+
+IS_TOLD = pushes._is_told
 
 
 class TestChoice:
@@ -32,6 +35,7 @@ class TestChoice:
         own: Shares | float = 0.9,
         shown: Any = (0, 1),
         tool: float = 0.1,
+        told: bool = True,
     ) -> tuple[str, list[tuple[str, int | None, float]]] | None:
         asked: list[str] = []
         weights: list[Any] = []
@@ -60,6 +64,7 @@ class TestChoice:
             return found
 
         monkeypatch.setattr(pushes, "_somewhere", somewhere)
+        monkeypatch.setattr(pushes, "_is_told", lambda found: told)
         monkeypatch.setattr(
             pushes, "_off_the_links", lambda *_: ("beyond", np.ones(3), shares.get("beyond", 0.0))
         )
@@ -84,7 +89,7 @@ class TestChoice:
             links = [f"f{joints}"]
         first = [*(f"t{j + 1}" for j in shown), "f0", *links, *(["p1"] if not tool and joints > 3 else [])]
         # where a force may act besides, only its error asks
-        of = "" if found is None else found.added.name[0]  # type: ignore[attr-defined]
+        of = "" if found is None else "f" if not told else found.added.name[0]  # type: ignore[attr-defined]
         besides = {
             "f": [f"f{k / 2}" for k in range(1, 2 * joints + 1)],
             "p": ["p0.5", "p0.75", "p1.25", "p1.5"],
@@ -113,6 +118,20 @@ class TestChoice:
         # or of all
         found = self.pushed(monkeypatch, {"t1": 0.86, "f0": 0.9}, 3, own={"t1": 0.7, "f0": 0.9})
         assert found == ("t1", [("external_contact", None, 0.9)])
+
+    def test_a_force_smaller_than_its_own_error_is_the_torque_that_explains_as_much(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        force = ("external_contact", None, 0.9)
+        shares = {"t1": 0.87, "t2": 0.88, "f0": 0.9}
+        found = self.pushed(monkeypatch, shares, told=False)
+        assert found == ("t2", [force, ("external_torque", 1, 0.87)])
+        # if there is one
+        assert self.pushed(monkeypatch, {"t1": 0.5, "f0": 0.9}, told=False) == ("f0", [])
+        for error, told in ((0.9, True), (1.1, False)):
+            given = Estimate([0.0, 3.0, 0.0], [0.0, 3.0 * error, 9.0], "N")
+            contact: Any = SimpleNamespace(added=SimpleNamespace(parameters={"force": given}))
+            assert IS_TOLD(contact) is told
 
     def test_on_the_tool_before_a_link_and_of_links_or_joints_the_one_that_explains_most(
         self, monkeypatch: pytest.MonkeyPatch

@@ -162,13 +162,18 @@ def push(
     # what one joint alone shows may be due to a force on any link from that on
     alone = {kind.effect.joint: trial for trial, kind in equals if kind.effect.joint is not None}
     found = _somewhere(best, anywhere, beyond, min(alone, default=None))
-    strength = size_of_force(found.added.parameters["force"])
-    if not alone or number(strength.value) > number(strength.std_error):
+    if not alone or _is_told(found):
         return found
     # a force of which next to nothing is known tells less than the torque that it asks of the joint
-    torque = max(alone.values(), key=lambda trial: trial.share)
-    others = [rival for rival in best.rivals if rival[0].place != torque.added.effect.place]
-    return replace(torque, rivals=[(best.added.effect, best.share), *others])
+    joint = max(alone, key=lambda j: alone[j].share)
+    others = [rival for rival in best.rivals if rival[0].joint != joint]
+    return replace(alone[joint], rivals=[(chosen.effect, best.share), *others])
+
+
+def _is_told(found: Contact) -> bool:
+    """Whether a force is larger than its own standard error."""
+    strength = size_of_force(found.added.parameters["force"])
+    return number(strength.value) > number(strength.std_error)
 
 
 def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, joint: int) -> Contact | None:

@@ -258,6 +258,14 @@ class UncertaintyData(Struct):
             description="per joint the covariance of dry level and viscous coefficient",
         ),
     ] = []
+    sensor_drift: Annotated[
+        list[Annotated[list[NotNegative], _TWO]],
+        Meta(
+            max_length=MOST_JOINTS,
+            description="per joint, between logs: sd of its torque's constant and rate",
+        ),
+    ] = []
+    sensor_drift_freedom: Positive | None = None
     between_logs_known: Literal["assumed", "alike", "different"] = "different"
     between_logs_freedom: Positive | None = None
 

@@ -84,7 +84,7 @@ def _agree(model: ModelData) -> None:
         ("history.encoder_zeros.spread", UNSET if zeros is UNSET else zeros.spread),
         *(
             (f"uncertainty.{key}", getattr(model.uncertainty, key) or None)
-            for key in ("joints", "friction", "stribeck", "between_logs")
+            for key in ("joints", "friction", "stribeck", "between_logs", "sensor_drift")
         ),
     ]
     for part in model.components:

@@ -20,6 +20,7 @@ from armloop.identification.uncertainty import Fitted, between_logs, standard_er
 from armloop.identification.uncertainty.between_logs import log_numbers
 from armloop.identification.uncertainty.blocking import independent_blocks
 from armloop.identification.uncertainty.cross_fitting import cross_fitted, training_parts
+from armloop.identification.uncertainty.sensor_drift import sensor_drift
 from armloop.identification.uncertainty.standard_errors import MOST_UNKNOWNS
 from armloop.identification.uncertainty.unknowns import problems
 from armloop.model import ReconstructedModel
@@ -46,8 +47,15 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
     friction = model.friction.torque(motion, load=model.joint_load(motion)) * slides
     level = np.sqrt((friction**2).sum(axis=0) / np.maximum(slides.sum(axis=0), 1))
     between = between_logs(left, slides, motion, blocks, level)
+    drift = sensor_drift(left, slides, motion, float(np.median(np.diff(motion.time))))
+    zeros = (
+        {}
+        if drift is None
+        else {"sensor_drift": drift.deviations.tolist(), "sensor_drift_freedom": drift.freedom}
+    )
     return {
         **errors,
+        **zeros,
         "between_logs": between.covariances,
         "between_logs_known": between.known,
         "between_logs_freedom": between.freedom,

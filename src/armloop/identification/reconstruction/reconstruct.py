@@ -48,6 +48,7 @@ from armloop.identification.scoring import Score, residual
 from armloop.identification.shared_motors import sharing, without_shared_standstill
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.identification.uncertainty.heterogeneity import notes as heterogeneity_notes
+from armloop.identification.uncertainty.sensor_drift import notes as drift_notes
 from armloop.model import ReconstructedModel
 from armloop.model.added_effect import ripples
 from armloop.robot.arm import Arm
@@ -346,7 +347,7 @@ def _finished(
     if ready.options.standard_errors:
         progress("standard errors of the coefficients")
         model = replace(model, uncertainty=uncertainty(model, data, found, tried.library.shared))
-        notes += [*between_logs_notes(model), *heterogeneity_notes(model)]
+        notes += [*between_logs_notes(model), *drift_notes(model), *heterogeneity_notes(model)]
         model = replace(model, history={**model.history, "notes": notes})
     return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
 

@@ -14,6 +14,7 @@ import numpy as np
 from armloop.data.motion import Samples
 from armloop.data.signals import rate_along, smooth
 from armloop.identification.uncertainty.between_logs import friction_spread
+from armloop.identification.uncertainty.sensor_drift import drift_spread
 from armloop.identification.uncertainty.unknowns import Unknown, problems
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
@@ -58,8 +59,9 @@ def _directions(rows: Sequence[str]) -> Array:
 def torque_errors(model: ReconstructedModel, samples: Samples, between_logs: bool = True) -> Array:
     """(N, n, r) torque of independent errors of the model, one standard deviation each, through the samples' filter.
 
-    Of its coefficients, of a record of the torque that was out of step, and of friction where it differs between logs, if
-    that is asked for. None (r = 0) of a model that keeps no directions of its unknowns, such as one made by hand.
+    Of its coefficients, of a record of the torque that was out of step, of zeros of torques that differ between logs, and of
+    friction where it does, if that is asked for. None (r = 0) of a model that keeps no directions of its unknowns, such as
+    one made by hand.
     """
     kept: Sequence[dict[str, Any]] = model.uncertainty.get("torque", [])
     # by their names: a file gives a joint's terms back in another order than they were found in
@@ -84,6 +86,7 @@ def torque_errors(model: ReconstructedModel, samples: Samples, between_logs: boo
     if lag:
         predicted = smooth(samples, model.predict(samples.motion))
         parts.append(lag * rate_along(samples, predicted)[:, :, None])
+    parts.append(drift_spread(model, samples))
     if between_logs and (spread := friction_spread(model, samples)).any():
         parts.append(spread)
     return np.concatenate(parts, axis=2) if parts else np.zeros((*samples.motion.q.shape, 0))

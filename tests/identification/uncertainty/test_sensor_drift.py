@@ -1,0 +1,98 @@
+"""Zeros of torques that differ from log to log and drift: their variances, what they do to a run's torque, what is said."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm, t
+
+from armloop.data.motion import Motion, Samples
+from armloop.identification.uncertainty.sensor_drift import drift_spread, notes, sensor_drift
+
+SECONDS, RATE = 40.0, 25.0
+
+
+def sines(logs: int, joints: int = 2, seconds: float = SECONDS) -> tuple[Motion, np.ndarray]:
+    """Logs of joints that slide back and forth, each at other speeds, and the numbers of the logs."""
+    time = np.arange(0.0, seconds, 1 / RATE)
+    v = np.concatenate(
+        [(1 + 0.2 * k) * np.cos(np.outer(time, 0.7 + 0.1 * k + 0.3 * np.arange(joints))) for k in range(logs)]
+    )
+    starts = len(time) * np.arange(logs)
+    motion = Motion(np.tile(time, logs), np.zeros_like(v), v, np.zeros_like(v), starts)
+    return motion, np.repeat(np.arange(logs), len(time))
+
+
+def found(left: np.ndarray, motion: Motion) -> Any:
+    return sensor_drift(left, np.ones_like(left, dtype=bool), motion, 1 / RATE)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_constants_and_rates_that_differ_are_found_and_friction_that_does_is_none(seed: int) -> None:
+    rng, (motion, logs) = np.random.default_rng(seed), sines(12)
+    noise = 0.05 * rng.normal(size=motion.v.shape)
+    constant, rate = 0.3 * rng.normal(size=12), 0.01 * rng.normal(size=12)
+    rubs = (0.5 * rng.normal(size=12))[logs][:, None] * np.sign(motion.v)
+    since = (motion.time - 0.5 * (SECONDS - 1 / RATE))[:, None]
+    left = noise + rubs + (constant - constant.mean())[logs][:, None] + rate[logs][:, None] * since
+    deviations, freedom = found(left, motion)
+    assert freedom == 11 + 2
+    # both joints see the same logs; the mean of twelve is the model's
+    np.testing.assert_allclose(deviations[:, 0], np.std(constant, ddof=1) * np.sqrt(13 / 12), rtol=0.1)
+    np.testing.assert_allclose(deviations[:, 1], np.sqrt(np.mean(rate**2)), rtol=0.1)
+    assert found(noise + rubs, motion) is None
+
+
+@pytest.mark.parametrize(("logs", "seconds"), [(3, 40.0), (8, 20.0), (4, 80.0)])
+def test_zeros_that_do_not_differ_are_rarely_said_to(logs: int, seconds: float) -> None:
+    rng, (motion, _) = np.random.default_rng(logs), sines(logs, seconds=seconds)
+    said = [found(rng.normal(size=motion.v.shape), motion) is not None for _ in range(300)]
+    assert sum(said) <= 4
+
+
+def test_two_logs_one_way_and_a_few_blocks_tell_nothing() -> None:
+    rng, (motion, logs) = np.random.default_rng(0), sines(4)
+    left = 0.01 * rng.normal(size=motion.v.shape) + np.array([-1.0, 1.0, 2.0, -2.0])[logs][:, None]
+    assert found(left, motion) is not None
+    few = logs < 2
+    part = Motion(*(x[few] for x in (motion.time, motion.q, motion.v, motion.vdot)), motion.starts[:2])
+    assert found(left[few], part) is None
+    one_way = Motion(motion.time, motion.q, np.abs(motion.v), motion.vdot, motion.starts)
+    assert found(left, one_way) is None
+    # what wanders for ten seconds leaves no six blocks of forty
+    slow = np.convolve(rng.normal(size=len(left)), np.ones(250) / 250, "same")[:, None]
+    assert found(left + 2 * slow, motion) is None
+
+
+def test_a_joint_that_tells_nothing_has_no_drift_and_the_others_have() -> None:
+    rng, (motion, logs) = np.random.default_rng(0), sines(5)
+    left = 0.01 * rng.normal(size=motion.v.shape) + rng.normal(size=5)[logs][:, None]
+    rows = np.ones_like(left, dtype=bool)
+    rows[:, 1] = False
+    deviations, _ = sensor_drift(left, rows, motion, 1 / RATE)  # type: ignore[misc]
+    assert deviations[0, 0] > 0.1 and (deviations[1] == 0).all()
+
+
+def test_what_it_does_to_a_run_and_what_is_said() -> None:
+    motion, logs = sines(2)
+    samples = Samples(motion, 0 * motion.v, np.ones(motion.v.shape, dtype=bool), 1 / RATE)
+
+    def model(**uncertainty: Any) -> Any:
+        return SimpleNamespace(uncertainty=uncertainty, torque_units=["N*m", "N"])
+
+    some = model(sensor_drift=[[0.3, 0.0], [0.0, 0.02]], sensor_drift_freedom=4.0)
+    torque = drift_spread(some, samples)
+    wider = t.isf(norm.sf(3), 4) / 3
+    assert torque.shape == (len(logs), 2, 2)
+    np.testing.assert_allclose(torque[:, 0, 0], 0.3 * wider)
+    middle = 0.5 * (SECONDS - 1 / RATE)
+    np.testing.assert_allclose(torque[:, 1, 1], 0.02 * wider * (motion.time - middle))
+    assert not torque[:, 1, 0].any() and not torque[:, 0, 1].any()
+    assert drift_spread(model(), samples).shape[2] == 0
+    first, second = notes(some)
+    assert "joint 1" in first and "0.3 N*m" in first and "drifts" not in first
+    assert "joint 2" in second and "drifts within them by 0.02 N/s" in second and "differs" not in second
+    assert notes(model()) == []
