@@ -27,6 +27,8 @@ from armloop.util.progress import Progress
 _ROWS = 15_000
 #: What a law's coefficients are drawn to nothing with, beside a prior of the others: next to nothing.
 _FREE = 1e-9
+#: A joint's load is confirmed that lies within this part of it, RMS.
+_CONFIRMED = 0.1
 
 
 class Fitting:
@@ -59,6 +61,8 @@ class Fitting:
         """The laws that the training data show, and every joint's friction chosen beside them."""
         self._progress("choosing each joint's friction on held-out data")
         selection, samples = self._selected(), self._training.window.samples
+        if self._misjudges_load(selection):
+            selection = self._beside(Laws(), selection)
         laws = search(self._arm, samples, self._bench(selection), self._progress)
         while laws.chosen:
             selection = self._beside(laws, selection)
@@ -73,6 +77,23 @@ class Fitting:
         elif self._design.laws.chosen:
             selection = self._beside(laws, selection)
         return self._possible(selection, laws)
+
+    def _misjudges_load(self, selection: FrictionSelection) -> bool:
+        """Whether friction that grows with a joint's load was chosen by one that the coefficients beside it do not confirm.
+
+        The load is known from a regression with plain friction before any is chosen, which may take a part of a weight.
+        """
+        rubs = [any(term.by_load for term in law) for law in selection.laws]
+        if self._design.load is None or not any(rubs):
+            return False
+        found = self._design.loaded(self._window_solution(self._design, selection).theta)
+        assert found.load is not None
+        motion = self._training.window.samples.motion
+        columns = self._own.library(motion)
+        r = self._own.count
+        old, new = (columns @ load[:r] for load in (self._design.load, found.load))
+        sizes = np.sqrt(np.mean(np.square([new - old, new]), axis=1))
+        return bool((sizes[0] > _CONFIRMED * sizes[1])[rubs].any())
 
     def _possible(self, selection: FrictionSelection, laws: Laws) -> tuple[FrictionSelection, Laws]:
         """The same without laws that no arm has with the coefficients that all of the data give them."""

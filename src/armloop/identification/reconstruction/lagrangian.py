@@ -93,7 +93,8 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     energy = library.take(chosen)
     progress(f"lagrangian: {len(chosen)} terms chosen")
     design = Design(arm, energy.columns, energy.count)
-    design = design.loaded(data.sum(partial(Survey.of, design=design), "load").load(energy.count))
+    survey = data.sum(partial(Survey.of, design=design), "load")
+    design = design.loaded(survey.load(energy.count, constant_weights(arm)))
     fitting = Fitting(arm, training, design, {}, options, progress)
     selection, laws = fitting.chosen()
     r = energy.count + laws.count

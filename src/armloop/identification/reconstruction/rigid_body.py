@@ -16,6 +16,7 @@ import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.dynamics.physics import joint_limits
+from armloop.features.lagrangian import constant_weights
 from armloop.features.rigid_body import BaseParameters, rotor_names
 from armloop.identification.reconstruction.catalogue import Laws
 from armloop.identification.reconstruction.data import Data
@@ -75,7 +76,7 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     check_moves(arm, survey.fitted)
     unknown = undetermined_notes(survey.products(base.count), base)
     nominal = np.concatenate([nominal_parameters(arm), np.zeros(arm.n)])
-    design = design.loaded(survey.load(base.count))
+    design = design.loaded(survey.load(base.count, constant_weights(arm)))
     fitting = Fitting(arm, training, design, _priors(arm, base, nominal), options, progress)
     selection, laws = fitting.chosen()
     r = base.count + laws.count

@@ -7,6 +7,7 @@ the model that is handed out needs no pass of its own.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -56,10 +57,18 @@ class Survey(Sums):
         """(r, r) products of the first shared columns over all samples that are fitted."""
         return np.asarray(sum(part.G[:count, :count] for own in self.sums.parts for part in own))
 
-    def load(self, count: int) -> Array:
-        """(r,) shared coefficients beside plain friction, by the fast samples."""
+    def load(self, count: int, weights_of: Collection[int] = ()) -> Array:
+        """(r,) shared coefficients beside plain friction, by the fast samples.
+
+        Args:
+            weights_of: joints (0-based) whose constant torque is a weight, which no friction's offset takes.
+        """
         plain = Pooled(self.sums, [list(PLAIN_FRICTION)] * len(self.sums.parts))
-        return plain.solve(plain.everything).theta[:count]
+        choice = [
+            [k for k in own if j not in weights_of or PLAIN_FRICTION[k].kind != "offset"]
+            for j, own in enumerate(plain.everything)
+        ]
+        return plain.solve(choice).theta[:count]
 
 
 @dataclass(frozen=True, eq=False)
