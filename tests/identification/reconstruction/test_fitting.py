@@ -27,6 +27,7 @@ from armloop.identification.reconstruction.pooled import Prior
 from armloop.identification.reconstruction.training import Training, fitted_rows
 from armloop.laws.effects import Context, hypotheses
 from armloop.laws.friction import FrictionTerm
+from armloop.robot.kinematics import nominal_parameters
 
 OFFSET, VISCOUS, DIRECTION = FrictionTerm("offset"), FrictionTerm("viscous"), FrictionTerm("sign")
 
@@ -170,3 +171,29 @@ def test_laws_that_cannot_be_with_all_data_are_left_out(
     assert ours.covariance.shape == (2, 2)
     both = selection(1.0, 0.1, 2.0, 0.2)
     assert ours._possible(both, laws) == (both, laws) and ours.covariance.shape == (4, 4)
+
+
+def test_friction_by_load_is_chosen_anew_where_its_load_was_another(
+    training: Training, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only if some friction grows with a load that the coefficients beside it put a tenth or more elsewhere."""
+    theta = BASE.from_full(np.append(nominal_parameters(ARM), np.zeros(3)))
+    by_load, plain = FrictionTerm("load_smooth_sign", parameter=0.01), FrictionTerm("viscous")
+    columns = DESIGN.library(training.window.samples.motion)
+    rms = np.sqrt(np.mean((columns @ theta) ** 2, axis=0))
+    # what turns about the first axis loads joint 1 alone
+    heavier = theta + 0.5 * theta[0] * np.eye(BASE.count)[0]
+    off = np.sqrt(np.mean((columns @ (heavier - theta)) ** 2, axis=0)) / rms
+    assert off[2] == 0 and off[0] > 0.1
+    for load, laws, misjudged in (
+        (theta, [[by_load], [by_load], [by_load]], False),
+        (heavier, [[by_load], [plain], [plain]], True),
+        (heavier, [[plain], [by_load], [by_load]], False),
+        (heavier, [[plain], [plain], [plain]], False),
+    ):
+        ours = Fitting(ARM, training, DESIGN.loaded(load), {}, training.options, print)
+        solved = SimpleNamespace(theta=np.concatenate([theta, np.zeros(3)]))
+        monkeypatch.setattr(ours, "_window_solution", lambda design, selection, solved=solved: solved)
+        selection: Any = SimpleNamespace(laws=laws)
+        assert ours._misjudges_load(selection) is misjudged
+    assert not Fitting(ARM, training, DESIGN, {}, training.options, print)._misjudges_load(selection)

@@ -12,6 +12,7 @@ from armloop.data.motion import Motion, Samples
 from armloop.identification.reconstruction import training
 from armloop.identification.reconstruction.inner_folds import InnerFolds
 from armloop.identification.reconstruction.joint_sums import JointSums
+from armloop.identification.reconstruction.shared import PLAIN_FRICTION
 from armloop.identification.reconstruction.training import Survey, Training
 from armloop.regression.moments import Moments
 
@@ -112,3 +113,21 @@ def test_each_chunk_knows_how_many_blocks_came_before_it() -> None:
         3,
         {0: InnerFolds(3, 3.005, 0)},
     )
+
+
+def test_a_weight_is_no_offset_of_the_friction_that_stands_in() -> None:
+    """One joint whose torque is a weight, of which the motion beside the offset tells a half, and friction."""
+    rng = np.random.default_rng(0)
+    weight = 9.81 + 0.01 * rng.normal(size=400)
+    rubs = rng.normal(size=(400, len(PLAIN_FRICTION)))
+    place = [term.kind for term in PLAIN_FRICTION].index("offset")
+    rubs[:, place] = 1.0
+    X = np.column_stack([weight, rubs])
+    # a disturbance that is like the little that moves
+    y = 2.0 * weight - 100.0 * (weight - 9.81)
+    sums = JointSums(
+        [[Moments.of(X, y), Moments.none(X.shape[1])]], [[Moments.of(X, y), Moments.none(X.shape[1])]]
+    )
+    survey = Survey(sums, (400,), np.array([400]), np.array([400]))
+    assert survey.load(1)[0] < -50
+    assert survey.load(1, [0])[0] == pytest.approx(2.0, abs=0.1)
