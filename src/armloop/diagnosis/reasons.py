@@ -190,7 +190,7 @@ def masked(labels: Sequence[str]) -> list[str]:
     which = " and ".join(filter(None, [", ".join(labels[:-1]), labels[-1]]))
     return [
         f"{which} would explain some of what is left there, but {is_no} larger than what the model's own coefficients may "
-        f"be wrong by, friction and zeros that differ from log to log among them: {it_is} not stated"
+        f"be wrong by, friction that differs from log to log and zeros of torques that do among them: {it_is} not stated"
     ]
 
 

@@ -110,8 +110,8 @@ def test_a_parameter_is_sought_where_the_run_can_show_it() -> None:
         grid("torque_ripple", context(20.0, v=v, period=p)) for v, p in ((200.0, 0.01), (0.1, 0.001))
     )
     assert fast[-1] == 24.0 and fine[-1] == 240.0 and fast[0] == fine[0] == orders[0]
-    # what the model has is asked for, too, however fast the joint is
-    ripples = replace(context(20.0, v=200.0), ripples={2: (200.0, 7.0), 1: (99.0,)})
+    # what the model has is asked for, too, however fast the joint is, if it is of teeth: else its order is unknown as well
+    ripples = replace(context(20.0, v=200.0), ripples={2: (200.0, 7.0, 310.5), 1: (99.0,)})
     assert grid("torque_ripple", ripples) == [*fast, 200.0]
 
 

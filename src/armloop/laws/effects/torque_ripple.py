@@ -104,8 +104,8 @@ class TorqueRipple(Law):
         top = 2 * np.pi * self.band / context.period / max(speed, 1e-3)
         orders = range(self.lowest_order, int(min(max(top, 24), 240)) + 1)
         # one that the model has may have grown, however little of it a filter leaves where the joint is fast
-        known = context.ripples.get(self.index + 1, ())
-        return sorted({*map(float, orders), *(float(order) for order in known)})
+        known = (float(order) for order in context.ripples.get(self.index + 1, ()))
+        return sorted({*map(float, orders), *(order for order in known if order.is_integer())})
 
     def between(self, context: Context, shape: float) -> Sequence[float]:
         step = self.part * 2 * np.pi / max(float(np.ptp(context.motion.q[:, self.index])), TINY)
