@@ -176,7 +176,7 @@ def test_without_room_for_a_positive_mass_matrix_the_notes_say_so(monkeypatch: p
     notes = reconstruct([a_run(1)], three_axis(), library="lagrangian", options=PLAIN).notes
     assert any("contradict a positive definite M(q)" in note for note in notes)
     assert any(note.startswith("M(q) is not positive definite") for note in notes)
-    assert any("try --library rigid-body" in note for note in notes)
+    assert any("do not suit this arm" in note for note in notes)
 
 
 def test_where_no_positive_mass_matrix_is_found_the_notes_say_so(monkeypatch: pytest.MonkeyPatch):

@@ -65,7 +65,7 @@ class TestWhole:
         survey = SimpleNamespace(
             fitted=np.full(3, 200),
             products=lambda count: np.eye(count),
-            load=lambda count: np.zeros(count),
+            load=lambda count, weights_of: np.zeros(count),
             sliding=np.array([5, 6, 7]),
         )
         training = SimpleNamespace(survey=survey, memory=3.0)

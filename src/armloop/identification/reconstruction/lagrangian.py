@@ -299,15 +299,30 @@ def _walk(library: EnergyTerms, samples: Samples, rows: Mask) -> Iterator[tuple[
 
 
 def _greedy(fit: Moments, judge: Moments, forced: Index, count: int) -> Index:
-    """Forced columns and those of the first ``count`` that held-out data welcome: sequential floating forward selection.
+    """Forced columns and those of the first ``count`` that held-out data welcome: of two searches what leaves less of these.
 
-    After each addition the weakest go for as long as what is left fits better than any set of that size before: a term taken
-    early stood in for several that come later (Pudil, Novovičová and Kittler, Pattern Recognition Letters 15, 1994).
+    Forward selection may keep a term that stood in for others; floating selection, which fits best with each number of
+    terms, follows a law that is missing more closely.
     """
 
     def held_out(support: Index) -> float:
         return max(judge.squared_error(fit.solve(support), support), _FLOOR * judge.yy)
 
+    found = [_selected(fit, held_out, forced, count, floating) for floating in (True, False)]
+    enough = _GOOD_ENOUGH * min(held_out(support) for support in found)
+    return min((support for support in found if held_out(support) <= enough), key=len)
+
+
+def _selected(
+    fit: Moments, held_out: Callable[[Index], float], forced: Index, count: int, floating: bool
+) -> Index:
+    """Sequential forward selection, and exchanges and omissions after it.
+
+    Args:
+        held_out: squared error of a support.
+        floating: whether after each addition the weakest go for as long as what is left fits better than any set of that
+            size before (Pudil, Novovičová and Kittler, Pattern Recognition Letters 15, 1994).
+    """
     others, fixed, support = np.arange(count), len(forced), forced
     # by the number of terms beside the forced ones: the best set, what it leaves, and what it leaves of held-out data
     best, left, errors = {0: forced}, dict[int, float](), {0: held_out(forced)}
@@ -328,7 +343,7 @@ def _greedy(fit: Moments, judge: Moments, forced: Index, count: int) -> Index:
         support = np.append(support, others[place])
         if not better(support, rss - gains[place]):
             support = best[len(support) - fixed]
-        while len(support) > fixed + 1:
+        while floating and len(support) > fixed + 1:
             rss, losses = fit.losses(support)
             losses[:fixed] = np.inf
             weakest = int(np.argmin(losses))
@@ -336,9 +351,8 @@ def _greedy(fit: Moments, judge: Moments, forced: Index, count: int) -> Index:
             if not better(shorter, rss + losses[weakest]):
                 break
             support = shorter
-    sizes = sorted(best)
     enough = _GOOD_ENOUGH * min(errors.values())
-    support = best[next(size for size in sizes if errors[size] <= enough)]
+    support = best[next(size for size in sorted(best) if errors[size] <= enough)]
     support = _swap(fit, support, fixed, others)
     support = _prune(fit, support, forced, held_out, min(enough, _GOOD_ENOUGH * held_out(support)))
     return _swap(fit, support, fixed, others)
