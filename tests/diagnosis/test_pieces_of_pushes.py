@@ -313,7 +313,7 @@ class TestTrialOfAPush:
             pushes, "FEW", 2
         )  # so that a force is what an arm of three joints feels above all
         monkeypatch.setattr(pushes, "MOSTLY", 0.6)
-        monkeypatch.setattr(pushes, "_is_told", lambda found: True)
+        monkeypatch.setattr(pushes, "is_told", lambda force: True)
         monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
         evidence: Any = SimpleNamespace(
             samples=SimpleNamespace(motion=motion((100,), 3), period=0.01, reach=0.02),

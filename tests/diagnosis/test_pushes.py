@@ -15,13 +15,11 @@ from armloop.data.motion import Motion
 from armloop.diagnosis import pushes
 from armloop.diagnosis.event_size import event_size_error
 from armloop.laws.effects import Estimate, effect
+from armloop.laws.effects.external_contact import is_told
 from armloop.robot.arm import load_arm
 from armloop.util.arrays import TINY
 
 Shares = dict[str, float]
-
-
-IS_TOLD = pushes._is_told
 
 
 class TestChoice:
@@ -51,7 +49,12 @@ class TestChoice:
             nothing: Any = None
             noticed = own if isinstance(own, float) else own[name]
             return pushes.Contact(
-                SimpleNamespace(name=name), nothing, nothing, nothing, shares[name], noticed
+                SimpleNamespace(name=name, parameters={"force": None}),
+                nothing,
+                nothing,
+                nothing,
+                shares[name],
+                noticed,
             )  # type: ignore[arg-type]
 
         monkeypatch.setattr(pushes, "_trial", trial)
@@ -64,7 +67,7 @@ class TestChoice:
             return found
 
         monkeypatch.setattr(pushes, "_somewhere", somewhere)
-        monkeypatch.setattr(pushes, "_is_told", lambda found: told)
+        monkeypatch.setattr(pushes, "is_told", lambda force: told)
         monkeypatch.setattr(
             pushes, "_off_the_links", lambda *_: ("beyond", np.ones(3), shares.get("beyond", 0.0))
         )
@@ -130,8 +133,7 @@ class TestChoice:
         assert self.pushed(monkeypatch, {"t1": 0.5, "f0": 0.9}, told=False) == ("f0", [])
         for error, told in ((0.9, True), (1.1, False)):
             given = Estimate([0.0, 3.0, 0.0], [0.0, 3.0 * error, 9.0], "N")
-            contact: Any = SimpleNamespace(added=SimpleNamespace(parameters={"force": given}))
-            assert IS_TOLD(contact) is told
+            assert is_told(given) is told
 
     def test_on_the_tool_before_a_link_and_of_links_or_joints_the_one_that_explains_most(
         self, monkeypatch: pytest.MonkeyPatch

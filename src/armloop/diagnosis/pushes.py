@@ -19,7 +19,7 @@ from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import interval
-from armloop.laws.effects.external_contact import size_of_force
+from armloop.laws.effects.external_contact import is_told
 from armloop.model import AddedEffect
 from armloop.util.arrays import TINY, Array, Index, Mask
 
@@ -162,18 +162,12 @@ def push(
     # what one joint alone shows may be due to a force on any link from that on
     alone = {kind.effect.joint: trial for trial, kind in equals if kind.effect.joint is not None}
     found = _somewhere(best, anywhere, beyond, min(alone, default=None))
-    if not alone or _is_told(found):
+    if not alone or is_told(found.added.parameters["force"]):
         return found
     # a force of which next to nothing is known tells less than the torque that it asks of the joint
     joint = max(alone, key=lambda j: alone[j].share)
     others = [rival for rival in best.rivals if rival[0].joint != joint]
     return replace(alone[joint], rivals=[(chosen.effect, best.share), *others])
-
-
-def _is_told(found: Contact) -> bool:
-    """Whether a force is larger than its own standard error."""
-    strength = size_of_force(found.added.parameters["force"])
-    return number(strength.value) > number(strength.std_error)
 
 
 def torque_on(evidence: Evidence, residual: Array, burst: slice, counted: Mask, joint: int) -> Contact | None:

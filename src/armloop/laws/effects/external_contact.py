@@ -62,7 +62,7 @@ class ExternalContact(Effect):
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         start, end, force = (parameters[key] for key in ("start", "end", "force"))
-        size = size_of_force(force).words(3)
+        size = _size(force).words(3)
         at = ", ".join(f"{x:.1f}" for x in np.asarray(force.value))
         where = (
             f"link {number(parameters['link'].value):.0f} at its far end"
@@ -78,9 +78,15 @@ class ExternalContact(Effect):
         )
 
 
-def size_of_force(force: Estimate) -> Estimate:
+def _size(force: Estimate) -> Estimate:
     """A force's size, and its standard error along the force (linear error propagation)."""
     components, errors = np.asarray(force.value, dtype=float), np.broadcast_to(force.std_error, 3)
     size = float(np.linalg.norm(components))
     along = components / size if size else np.full(3, 3**-0.5)
     return Estimate(size, float(np.linalg.norm(along * errors)), "N")
+
+
+def is_told(force: Estimate) -> bool:
+    """Whether a force is larger than its own standard error."""
+    size = _size(force)
+    return number(size.value) > number(size.std_error)
