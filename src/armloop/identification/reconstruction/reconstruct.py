@@ -256,17 +256,17 @@ def _compared(
     """What each library comes to, one of them chosen, and the part of the held-out blocks that judges it.
 
     Args:
-        behind: what was tried before and is not tried again.
+        behind: what was tried before and is not tried again, nor taken.
     """
     left = [one for one in wanted if one not in refused and one not in [each.library for each in behind]]
-    tried = [*(Contender(one, refused=why) for one, why in refused.items()), *behind]
+    tried = [Contender(one, refused=why) for one, why in refused.items()]
     if len(left) == 1 and not behind:
         made = attempt(left[0])
         tried.append(Contender(left[0], made, coefficients=made.coefficients(), chosen=True))
         return sorted(tried, key=lambda one: wanted.index(one.library)), "all"
     # half of the held-out blocks may be too few to judge by; a fold of the others then chooses the library
     few = len(left) + len(behind) > 1 and ready.few_held_out(wanted[0].conditioning)
-    tried = choose([*tried, *(contender(one, partial(attempt, nested=few)) for one in left)])
+    tried = [*choose([*tried, *(contender(one, partial(attempt, nested=few)) for one in left)]), *behind]
     tried.sort(key=lambda one: wanted.index(one.library))
     if few:
         tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
