@@ -39,15 +39,17 @@ def unfiltered(N: int, seed: int, speed: float = 1.0) -> Samples:
 
 
 class TestSums:
+    @pytest.mark.parametrize("at_once", [1, 6, 1000])
     def test_each_joint_has_the_terms_that_act_on_it_then_its_friction(
-        self, monkeypatch: pytest.MonkeyPatch
+        self, at_once: int, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """Whatever the number of rows that are evaluated at once."""
+        """Whatever the number of rows that are evaluated, and added, at once."""
         library = terms("v1^2", "v2^2", "v3^2", "cos(q3)*v2*v3", "sin(q2)")
         acting = [[0], [1, 3, 4], [2, 3]]
         samples = unfiltered(40, 0)
         rows = np.random.default_rng(1).random((40, 3)) < 0.4
         monkeypatch.setattr(lagrangian, "_CHUNK", 7)
+        monkeypatch.setattr(lagrangian, "_AT_ONCE", at_once)
         weights = np.array([1.0, 4.0, 0.5])
         found = _Problem.of(library, samples, rows, weights)
         columns, G, b, yy = library.columns(samples.motion), np.zeros((23, 23)), np.zeros(23), 0.0
@@ -137,6 +139,16 @@ def test_a_constant_force_is_weight_where_a_slide_lifts_it_and_an_offset_elsewhe
         assert (left["library"].degrees == degrees[energies]).all()
         expected = whole.refitted(support)
         np.testing.assert_allclose(left["theta"], expected[[*energies, *range(7, total)]])
+        assert (second["library"].degrees == degrees).all()
+    # of many candidates those that gain most beside the first choice are asked again, and what it has
+    monkeypatch.setattr(lagrangian, "_SCREENED", 1)
+    gained = whole.gains(support, np.arange(7))[1]
+    gained[support[support < 7]] = 0.0
+    asked.clear()
+    given.clear()
+    lagrangian._choose(library, data, weights, [])
+    near = sorted({0, 1, 4, int(np.argmax(gained))})
+    assert (given[-1]["library"].degrees == degrees[near]).all() and asked[-1][3] == len(near)
 
 
 def test_a_joint_that_never_slides_fast_is_told_by_its_number() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,14 +16,18 @@ from armloop.identification.uncertainty.standard_errors import Errors
 P, BLOCKS, ROWS = 6, 10, 30
 
 
-def regression(rng: np.random.Generator, logs: int, apart: float, weak: int = 0) -> tuple[Any, np.ndarray]:
+def regression(
+    rng: np.random.Generator, logs: int, apart: float, weak: int = 0, alike: float = 0.0
+) -> tuple[Any, np.ndarray]:
     """Errors of six coefficients, all of them truly zero, and their estimates.
 
     Args:
         apart: standard deviation of each coefficient between logs.
         weak: how many of the logs but the first do not show the last coefficient.
+        alike: correlation of the columns.
     """
     X = rng.normal(size=(logs, BLOCKS, ROWS, P))
+    X = np.sqrt(1 - alike) * X + np.sqrt(alike) * X[..., :1]
     X[1 : 1 + weak, ..., -1] *= 0.01
     y = rng.normal(size=(logs, BLOCKS, ROWS)) + rng.normal(size=(logs, BLOCKS, 1))
     y += np.einsum("gbrp,gp->gbr", X, apart * rng.normal(size=(logs, P)))
@@ -53,10 +58,11 @@ def test_errors_of_logs_that_differ_cover_and_by_blocks_alone_they_would_not() -
     assert within[0] == pytest.approx(0.9, abs=0.04) and within[1] < 0.5
 
 
-@pytest.mark.parametrize("logs", [2, 3, 6])
-def test_logs_that_are_alike_add_nothing_nine_times_in_ten(logs: int) -> None:
+@pytest.mark.parametrize(("logs", "alike"), [(2, 0.0), (3, 0.0), (6, 0.0), (3, 0.999)])
+def test_logs_that_are_alike_add_nothing_nine_times_in_ten(logs: int, alike: float) -> None:
+    """Of columns that are nearly one, all coefficients tell what one does."""
     rng = np.random.default_rng(logs)
-    found = [regression(rng, logs, 0.0)[0] for _ in range(300)]
+    found = [regression(rng, logs, 0.0, alike=alike)[0] for _ in range(300)]
     apart = sum(errors.heterogeneity.usual > 0 for errors in found)
     assert 5 < apart < 60
     alike = next(errors for errors in found if not errors.heterogeneity.usual)
@@ -100,3 +106,25 @@ def test_one_log_tells_nothing_and_nothing_is_said() -> None:
 
     assert said(0.0) == []
     assert "2.0 times" in said(3.0)[0]
+
+
+def test_what_is_usual_is_the_median_of_the_coefficients_that_logs_tell_of() -> None:
+    """One that differs by a thousand times as much is none of the others' business."""
+    covariance = np.diag([1.0, 2.0, 4.0, 1.0])
+    told = ByLogs(np.diag([3.0, 10.0, 4e3, 7e3]), np.array([2.0, 2.0, 2.0, 0.4]), (50.0, 8.0))
+    assert Heterogeneity.of([(told, covariance)], 40).usual == 5.0
+    assert Heterogeneity.of([(replace(told, apart=(1.0, 8.0)), covariance)], 40).usual == 0.0
+
+
+def test_what_a_constraint_leaves_in_all_blocks_alike_moves_none_of_them() -> None:
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(3, 20, 2))
+    G = np.einsum("brp,brq->bpq", X, X)
+    score, count = rng.normal(size=(3, 2)), np.array([[10.0], [30.0], [60.0]]) * np.ones(2)
+    score -= score.mean(axis=0)
+
+    def steps(score: np.ndarray) -> np.ndarray:
+        return Equations(G, score, count, np.zeros(2, dtype=np.intp), np.ones(2)).own_steps()
+
+    np.testing.assert_allclose(steps(score + count * [5.0, -2.0]), steps(score), atol=1e-9)
+    np.testing.assert_allclose(steps(score).sum(axis=0), 0.0, atol=1e-9)

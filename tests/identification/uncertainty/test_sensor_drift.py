@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +13,7 @@ from scipy.stats import norm, t
 from armloop.data.motion import Motion, Samples
 from armloop.identification.uncertainty.sensor_drift import drift_spread, notes, sensor_drift
 
+drift_module = import_module("armloop.identification.uncertainty.sensor_drift")
 SECONDS, RATE = 40.0, 25.0
 
 
@@ -44,6 +46,46 @@ def test_constants_and_rates_that_differ_are_found_and_friction_that_does_is_non
     np.testing.assert_allclose(deviations[:, 0], np.std(constant, ddof=1) * np.sqrt(13 / 12), rtol=0.1)
     np.testing.assert_allclose(deviations[:, 1], np.sqrt(np.mean(rate**2)), rtol=0.1)
     assert found(noise + rubs, motion) is None
+
+
+def test_of_few_logs_the_mean_is_the_models_and_one_more_is_as_far_from_it() -> None:
+    """Three logs of one arm: what the model has of their mean is off by a third of a variance."""
+    motion, logs = sines(3)
+    rng = np.random.default_rng(0)
+    constant = np.array([-0.3, 0.0, 0.3])
+    left = 1e-4 * rng.normal(size=motion.v.shape) + constant[logs][:, None]
+    deviations, freedom = found(left, motion)
+    assert freedom == 4.0
+    np.testing.assert_allclose(deviations[:, 0], 0.3 * np.sqrt(1 + 1 / 3), rtol=0.01)
+
+
+def test_joints_tell_together_what_is_usual_as_parts_of_what_is_left_of_them() -> None:
+    """Of two joints one has a zero that differs: the other, of which ten times as much is left, may have one as well."""
+    motion, logs = sines(3)
+    left = np.random.default_rng(0).normal(size=motion.v.shape) * [1e-3, 1.0]
+    left[:, 0] += np.array([-0.3, 0.0, 0.3])[logs]
+    (first, second), _ = found(left, motion)
+    part = 0.3**2 / np.mean(left[:, 0] ** 2)
+    usual, more = 0.5 * part, 4 / 3
+    assert first[0] == pytest.approx(np.sqrt(more * (2 * part + 2 * usual) / 4 / part) * 0.3, rel=0.02)
+    assert second[0] == pytest.approx(np.sqrt(more * 2 * usual / 4), rel=0.05)
+
+
+def test_friction_that_differs_is_no_zero_of_a_joint_that_turns_one_way_more_often() -> None:
+    rng, (motion, logs) = np.random.default_rng(1), sines(8)
+    motion = Motion(motion.time, motion.q, motion.v + 0.4, motion.vdot, motion.starts)
+    rubs = (0.5 * rng.normal(size=8))[logs][:, None] * np.sign(motion.v)
+    assert found(0.05 * rng.normal(size=motion.v.shape) + rubs, motion) is None
+
+
+def test_the_variances_by_blocks_are_those_of_the_estimates() -> None:
+    rng, (motion, logs) = np.random.default_rng(2), sines(3, joints=1)
+    every = np.ones(len(logs), dtype=bool)
+    each = [
+        drift_module._told(rng.normal(size=len(logs)), motion, every, logs, 0, 1 / RATE) for _ in range(150)
+    ]
+    b, S = (np.array([one[k] for one in each]) for k in (0, 1))  # type: ignore[index]
+    np.testing.assert_allclose(S.mean(axis=(0, 1)) / np.mean(b**2, axis=(0, 1)), 1.0, atol=0.2)
 
 
 @pytest.mark.parametrize(("logs", "seconds"), [(3, 40.0), (8, 20.0), (4, 80.0)])

@@ -213,9 +213,18 @@ def test_blocks_suit_the_slowest_residual_and_the_shortest_data(monkeypatch: pyt
 
     monkeypatch.setattr(standard, "independent_blocks", independent_blocks)
     monkeypatch.setattr(standard, "log_numbers", lambda motion: np.array([0, 0, 0, 0, 1, 1]))
-    monkeypatch.setattr(
-        standard.ByLogs, "of", lambda sums, logs, covariance: asked.update(logs=logs.tolist())
-    )
+    by_logs, apart = SimpleNamespace(), standard.Heterogeneity(3.0)
+
+    def of_logs(sums: Any, logs: Any, covariance: Any) -> Any:
+        asked["logs"] = logs.tolist()
+        return by_logs
+
+    def of_all(told: Any, blocks: int) -> Any:
+        assert [each for each, _ in told] == [by_logs] * 2 and blocks == 3
+        return apart
+
+    monkeypatch.setattr(standard.ByLogs, "of", of_logs)
+    monkeypatch.setattr(standard.Heterogeneity, "of", of_all)
     sums = SimpleNamespace(
         covariance=lambda: 0.0,
         degrees_of_freedom=lambda: None,
@@ -230,6 +239,7 @@ def test_blocks_suit_the_slowest_residual_and_the_shortest_data(monkeypatch: pyt
     found, seconds, correlation = standard.covariances(model, samples, fitted)
     assert (correlation, seconds, asked["seconds"], asked["step"]) == (4.0, 60.0, 60.0, 0.5)
     assert asked["logs"] == [0, 0, 1]
+    assert all(each.by_logs is by_logs and each.heterogeneity is apart for each in found)
     assert asked["covered"] == [[True] * 6, [True] * 3 + [False] * 3]
     assert [len(each.unknowns) for each in found] == [1, most]
 

@@ -64,8 +64,10 @@ _WORTH_A_SWAP = 1e-4
 _FLOOR = 1e-10
 #: Held-out nRMSE from which on a note says that the library may not suit.
 _POOR = 0.1
-#: Rows of the library evaluated at once.
-_CHUNK = 256
+#: Rows of the library evaluated at once, and of a joint added at once.
+_CHUNK, _AT_ONCE = 256, 1024
+#: Terms that are looked at again with the joints weighted by what is left of them.
+_SCREENED = 1500
 #: Place of the constant among a joint's friction.
 _OFFSET = [term.kind for term in FRICTION].index("offset")
 
@@ -247,8 +249,8 @@ def _used(chunk: Chunk) -> tuple[Mask, Mask]:
 def _choose(library: EnergyTerms, data: Data, weights: Array, weights_of: Sequence[int]) -> Index:
     """Indices of the terms to keep: chosen once with the joints weighted by torque, again by residual.
 
-    The products of thousands of candidates are as large as all else: they are added up with the weights, twice, and not
-    joint by joint.
+    The products of thousands of candidates are larger than all else: they are added up with the weights, all of them once
+    and of those that come near again, and not joint by joint.
 
     Args:
         weights: (n,) of each joint's squares, by its torque.
@@ -261,23 +263,27 @@ def _choose(library: EnergyTerms, data: Data, weights: Array, weights_of: Sequen
     friction = np.setdiff1d(np.arange(library.count, library.count + len(FRICTION) * n), offsets + _OFFSET)
     forced = np.concatenate([np.arange(n), np.flatnonzero(lifts), friction])
 
-    def chosen(weights: Array) -> tuple[Index, Array]:
-        """Terms with the joints so weighted, and their coefficients."""
-        sums = partial(_Problems.of, library=library, weights=weights)
+    def chosen(weights: Array, terms: Index) -> tuple[Index, Array, Index]:
+        """Of some terms those that are taken with the joints so weighted, their coefficients with friction's, and those that
+        come nearest to it (sure independence screening; Fan and Lv, J. Royal Statistical Society B 70, 2008).
+        """
+        own = library.take(terms)
+        sums = partial(_Problems.of, library=own, weights=weights)
         problems = reduce(iadd, data.map(sums, "normal equations of the candidates"))
         fit, judge = problems.fit.moments, problems.judge.moments
         for j in np.flatnonzero(problems.fit.counts == 0):
             raise ExcitationError(f"q{j + 1}: no sample that is fitted slides fast enough to choose terms by")
-        support = _greedy(fit, judge, forced, library.count)
-        return support, fit.refitted(support)
+        places = np.concatenate([terms, np.arange(library.count, library.count + len(FRICTION) * n)])
+        support = _greedy(fit, judge, np.searchsorted(places, forced), own.count)
+        few, theta = support[support < own.count], fit.refitted(support)
+        near = np.argsort(-fit.gains(support, np.arange(own.count))[1])[:_SCREENED]
+        theta = theta[[*few, *range(own.count, len(theta))]]
+        return terms[few], theta, terms[np.union1d(few, near)]
 
-    support, theta = chosen(weights)
-    few = support[support < library.count]
-    left = partial(
-        _Left.of, library=library.take(few), theta=theta[[*few, *range(library.count, len(theta))]]
-    )
-    support, _ = chosen(1 / data.sum(left, "what the first choice leaves").errors)
-    return np.sort(support[support < library.count])
+    few, theta, near = chosen(weights, np.arange(library.count))
+    left = partial(_Left.of, library=library.take(few), theta=theta)
+    weights = 1 / data.sum(left, "what the first choice leaves").errors
+    return np.sort(chosen(weights, near)[0])
 
 
 def _walk(library: EnergyTerms, samples: Samples, rows: Mask) -> Iterator[tuple[int, Index, Array, Array]]:
@@ -288,14 +294,23 @@ def _walk(library: EnergyTerms, samples: Samples, rows: Mask) -> Iterator[tuple[
         for j in range(motion.joints)
     ]
     used = np.flatnonzero(rows.any(axis=1))
+    wheres = [
+        np.concatenate([np.flatnonzero(a), np.arange(p + f * j, p + f * (j + 1))]) for j, a in enumerate(acts)
+    ]
+    # sums of products cost more to add to than to make: they are added to seldom
+    kept: list[list[tuple[Array, Array]]] = [[] for _ in wheres]
     for start in range(0, len(used), _CHUNK):
         index = used[start : start + _CHUNK]
         columns = library.columns(motion.take(index))
-        for j in range(motion.joints):
-            own, acting = rows[index, j], np.flatnonzero(acts[j])
-            where = np.concatenate([acting, np.arange(p + f * j, p + f * (j + 1))])
-            X = np.hstack([columns[own, j][:, acting], friction[j][index[own]]])
-            yield j, where, X, samples.tau[index[own], j]
+        last = start + _CHUNK >= len(used)
+        for j, (where, some) in enumerate(zip(wheres, kept, strict=True)):
+            own = rows[index, j]
+            X = np.hstack([columns[own, j][:, where[:-f]], friction[j][index[own]]])
+            some.append((X, samples.tau[index[own], j]))
+            if last or sum(len(y) for _, y in some) >= _AT_ONCE:
+                parts = [np.concatenate(of) for of in zip(*some, strict=True)]
+                some.clear()
+                yield j, where, parts[0], parts[1]
 
 
 def _greedy(fit: Moments, judge: Moments, forced: Index, count: int) -> Index:
