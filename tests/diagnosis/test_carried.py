@@ -398,3 +398,10 @@ def test_a_load_that_nobody_saw_put_down_is_a_payload_since_then(
     assert onset.posture == tuple(motion.q[then].tolist())
     twice = CarriedLoad(intervals=(Interval(1.0, 2.0, load.intervals[0].posture), *load.intervals))
     assert carrying._stated(twice, motion, [log]).effect is twice
+
+
+def test_a_load_that_is_kept_is_a_payload_since_it_was_picked_up(model: ReconstructedModel) -> None:
+    found = diagnose(model, [run(8, [(12.0, 99.0)])], jobs=1)
+    assert found.named == [("payload", None)]
+    (entry,) = found.to_dict()["effects"]
+    assert entry["since"]["value"] == pytest.approx(12.0, abs=0.2)

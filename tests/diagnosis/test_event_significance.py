@@ -38,6 +38,7 @@ def test_an_event_of_no_more_than_twice_what_nothing_accounts_for_at_other_times
     assert is_drowned(evidence, model, contact)
     # another joint's is none, nor what is accounted for, nor less than twice the baseline
     contact.before, contact.after = contact.before[::-1], contact.after[::-1]
+    assert is_drowned(evidence, model, contact)
     left[110:120, 1] = 4.4
     assert not is_drowned(evidence, model, contact)
     contact.before, contact.after = contact.before[::-1], contact.after[::-1]

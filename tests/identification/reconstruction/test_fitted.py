@@ -86,3 +86,31 @@ def test_what_effects_add_is_taken_from_the_torque(monkeypatch: pytest.MonkeyPat
     model: Any = Model(effects=("one",))
     found: Any = None
     assert (fitted.uncertainty(model, data, found, False)["tau"] == 3.0 - 10 * 0.5).all()
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_logs_are_left_out_whole_though_few_are_cut_into_pieces_for_laws(
+    alike: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    logs = np.array([0, 0, 0, 1, 1, 1])
+    parts, asked = logs if alike else np.arange(6), []
+
+    def cross_fitted(model: Any, samples: Any, rows: Any, by: np.ndarray) -> Any:
+        assert model.effects == ()
+        asked.append(by.tolist())
+        return by.tolist()
+
+    monkeypatch.setattr(fitted, "replace", lambda of, **new: type(of)(**{**vars(of), **new}))
+    monkeypatch.setattr(fitted, "fitted_rows", lambda chunk, found, shared: "rows")
+    monkeypatch.setattr(fitted, "problems", lambda model: [SimpleNamespace(unknowns=[0])])
+    monkeypatch.setattr(fitted, "training_parts", lambda motion: parts)
+    monkeypatch.setattr(fitted, "log_numbers", lambda motion: logs)
+    monkeypatch.setattr(fitted, "cross_fitted", cross_fitted)
+    monkeypatch.setattr(fitted, "empirical_null", lambda model, samples, left, by: [left, by.tolist()])
+    monkeypatch.setattr(fitted, "errors_of_left_out_logs", lambda samples, left, by: (left, by.tolist()))
+    data: Any = SimpleNamespace(reference=chunk(), in_memory=True)
+    model: Any = SimpleNamespace(effects=())
+    nothing: Any = None
+    found = fitted.left_out(model, data, nothing, False)
+    assert found == {"null": [parts.tolist()] * 2, "logs": (logs.tolist(), logs.tolist())}
+    assert asked == ([logs.tolist()] if alike else [parts.tolist(), logs.tolist()])

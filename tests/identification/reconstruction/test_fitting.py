@@ -197,3 +197,20 @@ def test_friction_by_load_is_chosen_anew_where_its_load_was_another(
         selection: Any = SimpleNamespace(laws=laws)
         assert ours._misjudges_load(selection) is misjudged
     assert not Fitting(ARM, training, DESIGN, {}, training.options, print)._misjudges_load(selection)
+
+
+@pytest.mark.parametrize("misjudged", [True, False])
+def test_friction_is_chosen_anew_before_laws_are_sought(
+    misjudged: bool, training: Training, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ours, beside = Fitting(ARM, training, DESIGN, {}, training.options, print), list[Any]()
+    monkeypatch.setattr(ours, "_selected", lambda: "first")
+    monkeypatch.setattr(ours, "_misjudges_load", lambda selection: misjudged)
+    monkeypatch.setattr(
+        ours, "_beside", lambda laws, selection: beside.append((laws.chosen, selection)) or "anew"
+    )
+    monkeypatch.setattr(ours, "_bench", lambda selection: selection)
+    monkeypatch.setattr(fitting, "search", lambda arm, samples, bench, progress: Laws())
+    selection, _ = ours.chosen()
+    assert selection == ("anew" if misjudged else "first")
+    assert beside == ([([], "first")] if misjudged else [])

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from armloop.features.lagrangian import candidates
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
 from armloop.identification.reconstruction.physical import PhysicalSolution
 from armloop.identification.reconstruction.pooled import Solution
+from armloop.identification.reconstruction.training import Survey
 from armloop.identification.scoring import score
 from armloop.model import ReconstructedModel, load_model
 from armloop.model.components import Lagrangian
@@ -212,3 +214,20 @@ def test_motion_that_tells_nothing_is_refused():
     still = replace(a_run(1), q=motion.q * [1.0, 0.0, 1.0], v=motion.v * [1.0, 0.0, 1.0])
     with pytest.raises(ExcitationError, match=r"^q2: joint 'joint_2' moves in \d+ samples"):
         reconstruct([still], three_axis(), library="lagrangian", options=PLAIN)
+
+
+def test_the_load_of_an_upright_slide_is_known_with_its_weight(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Friction that grows with it must not be fitted to what an offset has left of it."""
+    arm, asked = load_arm("scara"), list[Any]()
+
+    def load(self: Survey, count: int, weights_of: Any = ()) -> Any:
+        asked.append(list(weights_of))
+        raise ExcitationError("enough")
+
+    monkeypatch.setattr(Survey, "load", load)
+    motion = fourier_motion(20.0, 100.0, 3, arm, 0.1)
+    tau = rigid_torque(arm, motion.q, motion.v, motion.vdot) + 0.3 * np.sign(motion.v)
+    for library in ("lagrangian", "rigid-body"):
+        with pytest.raises(ExcitationError, match="enough"):
+            reconstruct([measured(motion, tau, 1)], arm, library=library, options=PLAIN)
+    assert asked == [np.flatnonzero(~arm.revolute).tolist()] * 2

@@ -45,6 +45,16 @@ def test_each_log_is_judged_where_the_others_went() -> None:
     assert errors_of_left_out_logs(made, left[: len(logs)], logs) == [None, None]
 
 
+def test_where_one_joint_goes_beyond_the_others_say_nothing() -> None:
+    """Its torque is part of theirs, though they themselves are where they always are."""
+    made, logs = samples((1.0, 1.0), (1.0, 1.0), (1.0, 1.0))
+    motion, far = made.motion, logs == 2
+    motion.q[far, 0] *= 2
+    left = np.tile([0.3, 0.1], (len(logs), 1))
+    left[far & (np.abs(motion.q[:, 0]) > 1.0)] = 9.0
+    assert errors_of_left_out_logs(made, left, logs) == pytest.approx([0.3, 0.1])
+
+
 def test_one_log_has_no_other() -> None:
     made, logs = samples((1.0, 1.0))
     assert errors_of_left_out_logs(made, np.zeros_like(made.tau), logs) == []

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
@@ -25,6 +26,7 @@ from armloop.identification.reconstruction.libraries import (
     choose,
     comparison_notes,
     contender,
+    left_behind,
     named,
 )
 from armloop.identification.reconstruction.rigid_body import RigidBodyLibrary
@@ -377,3 +379,33 @@ def test_what_leaves_less_but_is_no_arm_is_named() -> None:
     nothing: Any = None
     assert len(notes(replace(entry("a", 0.01, 9, GOOD), checks=None))) == 1
     assert Contender(nothing).coefficients == 0
+
+
+def test_what_leaves_three_times_as_much_as_the_one_taken_is_left_behind() -> None:
+    made: Any = SimpleNamespace()
+    one, far, near = (
+        Contender(named(name), made, nrmse=(error, None))
+        for name, error in (("rigid-body", 0.02), ("lagrangian", 0.061), ("double-feature-set", 0.059))
+    )
+    refused = Contender(named("lagrangian"), refused="why")
+    taken = replace(one, chosen=True)
+    assert left_behind([far, taken, near, refused]) == [far]
+
+
+def test_what_is_left_behind_is_not_tried_again_nor_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Though the other one fails a check now: it was made of the logs as they were taken to be before."""
+    wanted, tried = [named("rigid-body"), named("lagrangian")], list[Any]()
+    checks: Any = SimpleNamespace(failed=1)
+    module = import_module("armloop.identification.reconstruction.reconstruct")
+    made = Contender(wanted[0], SimpleNamespace(), nrmse=(0.02,), checks=checks)  # type: ignore[arg-type]
+    behind = Contender(wanted[1], SimpleNamespace(), nrmse=(0.2,))  # type: ignore[arg-type]
+
+    def contender(library: Any, attempt: Any) -> Any:
+        tried.append(library.name)
+        return made
+
+    monkeypatch.setattr(module, "contender", contender)
+    ready: Any = SimpleNamespace(few_held_out=lambda conditioning: False)
+    (first, second), judged_on = module._compared(wanted, {}, print, ready, [behind])
+    assert tried == ["rigid-body"] and judged_on == "test"
+    assert first.chosen and second is behind and not second.chosen

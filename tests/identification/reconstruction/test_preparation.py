@@ -153,3 +153,27 @@ def test_a_lag_is_looked_for_anew_beside_the_friction_and_the_ripples_that_are_f
 def ripple(order: float) -> dict[str, Estimate]:
     numbers = {"amplitude": 0.1, "order": order, "phase": 0.0}
     return {key: Estimate(value, 0.0, "") for key, value in numbers.items()}
+
+
+def test_the_second_comparison_leaves_behind_what_the_first_found_far_off(
+    asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked["lags"] = [0.0]
+    for check in ("check_torques", "check_recorded"):
+        monkeypatch.setattr(module, check, lambda *_: None)
+    given: list[Any] = []
+
+    def compared(wanted: Any, refused: Any, attempt: Any, ready: Any, behind: Any = ()) -> Any:
+        given.append(behind)
+        return f"round {len(given)}", "all"
+
+    monkeypatch.setattr(module, "_compared", compared)
+    monkeypatch.setattr(
+        module, "_chosen", lambda tried: SimpleNamespace(model=lambda: SimpleNamespace(effects=()))
+    )
+    monkeypatch.setattr(module, "_find_ripple", lambda *_: None)
+    monkeypatch.setattr(module, "_in_step", lambda ready, *_: ready)
+    monkeypatch.setattr(module, "left_behind", lambda tried: [f"far in {tried}"])
+    monkeypatch.setattr(module, "_finished", lambda tried, *_: tried)
+    assert reconstruct([LOG], three_axis()) == "round 2"
+    assert given == [(), ["far in round 1"]]

@@ -9,8 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import norm, t
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
+from armloop.data.log import MotionLog
 from armloop.data.motion import Motion, Samples
+from armloop.data.signals import preprocess
+from armloop.diagnosis import diagnose
+from armloop.identification.reconstruction import Options, reconstruct
+from armloop.identification.uncertainty.propagated import torque_errors
 from armloop.identification.uncertainty.sensor_drift import drift_spread, notes, sensor_drift
 
 drift_module = import_module("armloop.identification.uncertainty.sensor_drift")
@@ -138,3 +144,39 @@ def test_what_it_does_to_a_run_and_what_is_said() -> None:
     assert "joint 1" in first and "0.3 N*m" in first and "drifts" not in first
     assert "joint 2" in second and "drifts within them by 0.02 N/s" in second and "differs" not in second
     assert notes(model()) == []
+
+
+ZEROS = (-0.6, 0.1, 0.5)
+
+
+def day(seed: int, zero: float) -> MotionLog:
+    """A log of the paper's arm whose second joint's torque reads so much, N·m, too much."""
+    motion = fourier_motion(40.0, 100.0, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+    return measured(motion, tau + np.array([0.0, zero, 0.0]), seed, name=f"day_{seed}")
+
+
+@pytest.fixture(scope="module")
+def model() -> Any:
+    logs = [day(k + 1, zero) for k, zero in enumerate(ZEROS)]
+    return reconstruct(logs, three_axis(), library="rigid-body", options=Options(parts=False)).model
+
+
+def test_a_model_of_such_logs_keeps_it_and_says_so(model: Any) -> None:
+    kept = np.array(model.uncertainty["sensor_drift"])
+    # of the three joints' and what is usual of them, (2 own + 2 usual) / 4
+    own = np.std(ZEROS, ddof=1) * np.sqrt(4 / 3)
+    assert np.sqrt(0.5) * own * 0.9 < kept[1, 0] < own * 1.1
+    assert any(
+        "joint 2: the zero of the torque differs between the logs" in n for n in model.history["notes"]
+    )
+    samples = preprocess([day(9, 0.0)], model.conditioning)
+    errors = torque_errors(model, samples)[:, 1]
+    constant = np.abs(errors).min(axis=0).max()
+    assert constant == pytest.approx(kept[1, 0] * t.isf(norm.sf(3), 4) / 3)
+
+
+@pytest.mark.parametrize(("zero", "named"), [(-0.9, []), (6.0, [("torque_offset", 2)])])
+def test_a_later_run_is_weighed_by_it(zero: float, named: list[Any], model: Any) -> None:
+    """As far off as another log may be is no change; ten times that is one."""
+    assert diagnose(model, [day(9, zero)], jobs=1).named == named
