@@ -54,6 +54,15 @@ def test_constants_and_rates_that_differ_are_found_and_friction_that_does_is_non
     assert found(noise + rubs, motion) is None
 
 
+def test_what_noise_does_to_the_constants_is_no_variance_of_theirs() -> None:
+    """Constants as large as their own errors: what they scatter by is twice their variance."""
+    rng, (motion, logs) = np.random.default_rng(0), sines(40, joints=12)
+    alone = 0.02 * np.sqrt(SECONDS * RATE)  # white noise of which a log's mean has an error of .02
+    left = alone * rng.normal(size=motion.v.shape) + (0.02 * rng.normal(size=(40, 12)))[logs]
+    deviations, _ = found(left, motion)
+    assert np.sqrt(np.mean(deviations[:, 0] ** 2)) == pytest.approx(0.02, rel=0.15)
+
+
 def test_of_few_logs_the_mean_is_the_models_and_one_more_is_as_far_from_it() -> None:
     """Three logs of one arm: what the model has of their mean is off by a third of a variance."""
     motion, logs = sines(3)
