@@ -26,6 +26,18 @@ CUTOFF: float | None = option(
         lambda hz: hz == 0 or 1e-3 <= hz <= 1e4, "give a frequency from 0.001 to 10000 Hz, or 0 for no filter"
     ),
 )
+TORQUE_LAG: float | None = option(
+    "seconds by which tau is recorded later than q, where that is known, such as the delay of its filter (default: "
+    "found in the logs, where it is clear)",
+    check=within(-0.1, 0.1, "a record is late by at most 0.1 s"),
+)
+FRICTION: str | None = option(
+    "friction laws that may be chosen with rigid-body and lagrangian, such as coulomb,viscous: coulomb, coulomb_fading "
+    "(its sign fades in with the speed), viscous, offset (levels differ by direction), stribeck, nonlinear_viscous, "
+    "viscous_by_direction, coulomb_by_load, presliding (memory: spring-like before it slides), presliding_by_load; the "
+    "first of these is taken anyway, each other where it earns its place on held-out data (default: all)",
+    metavar="LAW,..",
+)
 
 
 class Logs(Options):
@@ -109,3 +121,8 @@ def processes(what: str, default: int | None = None) -> Any:
     """The option ``--jobs``: how many processes do something."""
     number = whole(1, MOST_PROCESSES, f"no number of processes; give 1 to {MOST_PROCESSES}")
     return option(f"processes that {what}", default, metavar="N", type=number)
+
+
+def friction_laws(named: str | None) -> tuple[str, ...] | None:
+    """The laws that --friction names, apart by commas; None for all."""
+    return None if named is None else tuple(name for one in named.split(",") if (name := one.strip()))

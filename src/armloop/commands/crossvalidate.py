@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Any
 from armloop.commands.arguments import (
     ARM_HELP,
     CUTOFF,
+    FRICTION,
     MAX_ORDER,
     METHOD,
+    TORQUE_LAG,
     Chain,
     Json,
     Logs,
     Recorded,
+    friction_laws,
     processes,
 )
 from armloop.commands.options import flag, option, positive, required
@@ -45,6 +48,8 @@ class Crossvalidate(Logs, Chain, Recorded, Json):
     method: str = METHOD
     library: str | None = option("as of armloop reconstruct (default: by number of joints)")
     cutoff: float | None = CUTOFF
+    torque_lag: float | None = TORQUE_LAG
+    friction: str | None = FRICTION
     max_order: int = MAX_ORDER
     no_physical: bool = flag(
         "do not keep M(q) positive definite and friction from driving", but_not="physical"
@@ -98,7 +103,12 @@ def run(options: Crossvalidate) -> None:
         "method": options.method,
         "library": options.library,
         "conditioning": None if options.cutoff is None else Conditioning(cutoff_hz=options.cutoff),
-        "options": Options(max_order=options.max_order, physical=not options.no_physical),
+        "options": Options(
+            max_order=options.max_order,
+            physical=not options.no_physical,
+            friction=friction_laws(options.friction),
+            torque_lag=options.torque_lag,
+        ),
         "progress": progress(options),
         "kept": kept,
         "workers": Processes(options.jobs),

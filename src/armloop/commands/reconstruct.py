@@ -7,15 +7,18 @@ import math
 from armloop.commands.arguments import (
     ARM_HELP,
     CUTOFF,
+    FRICTION,
     MAX_ORDER,
     METHOD,
+    TORQUE_LAG,
     Chain,
     Json,
     Logs,
     Recorded,
+    friction_laws,
     processes,
 )
-from armloop.commands.options import flag, option, positive, required, within
+from armloop.commands.options import flag, option, positive, required
 from armloop.util.errors import InputError
 from armloop.util.outputs import take_file
 
@@ -51,19 +54,9 @@ class Reconstruct(Logs, Chain, Recorded, Json):
     )
     max_order: int = MAX_ORDER
     cutoff: float | None = CUTOFF
-    torque_lag: float | None = option(
-        "seconds by which tau is recorded later than q, where that is known, such as the delay of its filter (default: "
-        "found in the logs, where it is clear)",
-        check=within(-0.1, 0.1, "a record is late by at most 0.1 s"),
-    )
+    torque_lag: float | None = TORQUE_LAG
     coefficients: bool = flag("print every coefficient with its standard error, too")
-    friction: str | None = option(
-        "friction laws that may be chosen with rigid-body and lagrangian, such as coulomb,viscous: coulomb, coulomb_fading "
-        "(its sign fades in with the speed), viscous, offset (levels differ by direction), stribeck, nonlinear_viscous, "
-        "viscous_by_direction, coulomb_by_load, presliding (memory: spring-like before it slides), presliding_by_load; the "
-        "first of these is taken anyway, each other where it earns its place on held-out data (default: all)",
-        metavar="LAW,..",
-    )
+    friction: str | None = FRICTION
     no_physical: bool = flag(
         "do not keep M(q) positive definite and friction from driving (rigid-body and lagrangian)"
     )
@@ -107,7 +100,6 @@ def run(options: Reconstruct) -> None:
     from armloop.util.workers import Cluster, Processes
 
     sparse, snr = Sparse(options.estimator, options.penalty), _snr(options)
-    names = None if options.friction is None else [name.strip() for name in options.friction.split(",")]
     take_file(options.out, "--out")
     take_file(options.report, "--report")
     arm = arm_of(options)
@@ -130,7 +122,7 @@ def run(options: Reconstruct) -> None:
                 max_order=options.max_order,
                 physical=not options.no_physical,
                 snr=snr,
-                friction=None if names is None else tuple(filter(None, names)),
+                friction=friction_laws(options.friction),
                 torque_lag=options.torque_lag,
             ),
             progress(options),

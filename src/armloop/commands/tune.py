@@ -15,7 +15,12 @@ class Tune(Chain, Json):
 
     scenario: str = argument("SCENARIO", "as for `armloop track`")
     arm: str | None = option("the arm of a scenario that leaves it open", metavar="URDF")
-    bandwidth: float = option("of every joint's closed loop; %(default)g by default", 5.0, metavar="HZ")
+    bandwidth: float = option(
+        "frequency at which every joint's closed loop, from the reference to the position, falls to 0.707 (-3 dB); it lies "
+        "above that of the loop's poles; %(default)g by default",
+        5.0,
+        metavar="HZ",
+    )
     margin: float = option("phase margin; %(default)g by default", 60.0, metavar="DEG")
     model: str | None = option(
         "a reconstructed model to design with; by default the simulated arm's own inertia",

@@ -43,7 +43,7 @@ def margins_table(tuning: Tuning) -> Table:
         for name, loop in _both(tuning)
         for j, m in enumerate(loop.margins)
     ]
-    headers = ["phase margin [deg]", "worst", "gain margin", "bandwidth [Hz]", "peak |S|", "worst"]
+    headers = ["phase margin [deg]", "worst", "gain margin [factor]", "bandwidth [Hz]", "peak |S|", "worst"]
     return make_table(["gains", "joint", *headers], rows, "Loops, the other joints' closed")
 
 

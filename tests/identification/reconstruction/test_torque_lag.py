@@ -63,16 +63,18 @@ def test_what_is_in_step_or_of_a_joint_alone_is_left(dead: float | np.ndarray) -
 @pytest.mark.parametrize(
     ("below", "error", "taken"),
     [
-        (DEAD, 1e-4, True),
-        (0.52 * DEAD, 1e-4, True),
-        (0.48 * DEAD, 1e-4, False),  # what is half as large below half the corner is no lag
-        (-DEAD, 1e-4, False),
-        (0.0, 0.35 * DEAD, True),  # three standard errors
-        (0.0, 0.32 * DEAD, False),
+        (DEAD, 1e-4, DEAD),
+        (0.52 * DEAD, 1e-4, 0.52 * DEAD),  # below half the corner an encoder's noise hides less of it
+        (0.48 * DEAD, 1e-4, 0.0),  # what is half as large below half the corner is no lag
+        (-DEAD, 1e-4, 0.0),
+        (0.0, 0.51 * DEAD, DEAD),  # two standard errors
+        (0.0, 0.49 * DEAD, 0.0),
+        (0.9 * DEAD, 0.04 * DEAD, 0.9 * DEAD),  # two of the difference's
+        (0.9 * DEAD, 0.06 * DEAD, DEAD),
     ],
 )
 def test_a_lag_is_the_same_at_all_frequencies(
-    below: float, error: float, taken: bool, monkeypatch: pytest.MonkeyPatch
+    below: float, error: float, taken: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def own(logs: Any, arm: Any, how: Conditioning, *_: Any) -> TorqueLag:
         whole = how.cutoff_hz == 8.5
@@ -80,7 +82,28 @@ def test_a_lag_is_the_same_at_all_frequencies(
         return TorqueLag(DEAD if whole else below, 1e-5 if whole else error, np.zeros(3), 9.0)
 
     monkeypatch.setattr("armloop.identification.reconstruction.torque_lag._found", own)
-    assert found(DEAD).seconds == (DEAD if taken else 0.0)
+    assert found(DEAD).seconds == taken
+
+
+@pytest.mark.parametrize(
+    ("odds", "below", "beside", "taken"),
+    [
+        (1.5, 9.0, None, 0.0),
+        (1.5, 9.0, Beside(), 0.9 * DEAD),
+        (9.0, 1.5, Beside(), 0.9 * DEAD),
+        (1.5, 1.5, Beside(), 0.0),
+    ],
+)
+def test_a_lag_that_was_taken_is_given_up_where_neither_corner_shows_it(
+    odds: float, below: float, beside: Beside | None, taken: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def own(logs: Any, arm: Any, how: Conditioning, *_: Any) -> TorqueLag:
+        whole = how.cutoff_hz == 8.5
+        return TorqueLag(DEAD if whole else 0.9 * DEAD, 1e-3, np.zeros(3), odds if whole else below)
+
+    monkeypatch.setattr(torque_lags, "_found", own)
+    given = [recorded(1, 0.0)], three_axis(), Conditioning(8.5), [np.zeros((0, 2))], 2.0
+    assert torque_lag(*given, beside).seconds == taken
 
 
 @pytest.mark.parametrize("dead", [-0.002, 0.002])
@@ -311,7 +334,8 @@ def bristly(seed: int) -> MotionLog:
 def test_friction_of_which_no_usual_law_has_the_memory_is_no_lag_beside_it() -> None:
     logs = [bristly(seed) for seed in (1, 2, 3)]
     given = logs, three_axis(), Conditioning(8.5), [np.zeros((0, 2))] * len(logs), 2.0
-    assert torque_lag(*given).seconds > 0.02
+    alone = torque_lag(*given)
+    assert alone.joints.min() > 0.02 and alone.clear
     own = [[FrictionTerm("viscous"), FrictionTerm("hysteresis", parameter=3e-4)]] * 3
     assert torque_lag(*given, Beside(friction=own)).seconds == 0.0
 

@@ -63,8 +63,8 @@ _ODDS, _ROUNDS, _FEWEST = 20.0, 4, 200
 _LAGS, _EXPECTED = np.arange(-2000, 2001) * 5e-5, 0.02
 _APART, _TAILS = np.geomspace(1e-4, 5e-3, 9), 3.0
 #: At two corners it differs by no more standard errors, or by less than this part of it.
-_SURE, _ALIKE = 3.0, 0.5
-#: Instruments contradict least squares by more of theirs.
+_SURE, _ALIKE = 2.0, 0.5
+#: Instruments contradict least squares by more of theirs, and the lower corner the higher by more of their difference's.
 _CONTRADICTED = 2.0
 #: The lower of the two corners, and that of the motion of which instruments are made, are so much lower.
 _SLOWER = 2.0
@@ -155,27 +155,42 @@ def torque_lag(
     """The lag of the logs' torque.
 
     A lag is one at all frequencies; what noise of the motion that a controller answers to looks like is none, and is gone
-    below half the corner.
+    below half the corner. Where nothing is known of the arm, one that is not plain at the corner itself is not looked for
+    below half of it; beside what is known, where a lag has been taken before, either corner may show it.
 
     Args:
         logs: of which as many samples are looked at as tell a lag, the same wherever they are kept.
         how: filter.
         aside: per log, (B, 2) intervals that take no part.
         block_seconds: length of pieces whose errors are independent.
-        beside: what is known of the arm; nothing by default.
+        beside: what is known of the arm whose logs have a lag that was taken; nothing by default.
     """
-    beside = beside or Beside()
+    first, beside = beside is None, beside or Beside()
     placed = placed_runs(logs, how.oversampling * how.cutoff_hz)
     some, left_out = [run for _, run in placed], [aside[k] for k, _ in placed]
     found = _found(some, arm, how, left_out, block_seconds, how.cutoff_hz, beside)
-    if abs(found.seconds) * how.cutoff_hz < FELT or not found.clear:
+    if first and not (found.clear and abs(found.seconds) * how.cutoff_hz >= FELT):
         return replace(found, seconds=0.0)
     # what a joint that sticks shows before it moves is a lead below any corner: it is kept out twice as far
     slower = replace(how, cutoff_hz=how.cutoff_hz / _SLOWER, smear=2 * how.smear)
     # where v is late, it is as late below half the corner: the torque's own lag alone may differ
     slow = _found(some, arm, slower, left_out, block_seconds, how.cutoff_hz, beside)
-    allowed = max(_SURE * float(np.hypot(found.std_error, slow.std_error)), _ALIKE * abs(found.seconds))
-    return found if abs(found.seconds - slow.seconds) <= allowed else replace(found, seconds=0.0)
+    return _agreed(found, slow, how.cutoff_hz)
+
+
+def _agreed(found: TorqueLag, slow: TorqueLag, cutoff_hz: float) -> TorqueLag:
+    """The lag that two corners agree on and either shows plainly; that of the lower one where it contradicts the higher.
+
+    An encoder's noise is faster than the motion: what it makes of a lag, or hides of one, is less below the lower corner.
+    """
+    apart = abs(found.seconds - slow.seconds)
+    same = apart <= max(_SURE * float(np.hypot(found.std_error, slow.std_error)), _ALIKE * abs(found.seconds))
+    if not same or not (found.clear or slow.clear):
+        return replace(found, seconds=0.0)
+    # the errors of the two are not independent (Hausman)
+    variance = slow.std_error**2 - found.std_error**2
+    taken = slow if apart > _CONTRADICTED * np.sqrt(max(variance, 0.0)) else found
+    return taken if abs(taken.seconds) * cutoff_hz >= FELT else replace(taken, seconds=0.0)
 
 
 def _found(
