@@ -106,6 +106,13 @@ def test_a_lag_that_was_taken_is_given_up_where_neither_corner_shows_it(
     assert torque_lag(*given, beside).seconds == taken
 
 
+@pytest.mark.parametrize(("below", "taken"), [(0.0012, 0.0012), (0.0011, 0.0)])
+def test_what_is_taken_of_two_corners_is_felt(below: float, taken: float) -> None:
+    """A hundredth of a period of 8.5 Hz is 1.18 ms."""
+    found, slow = (TorqueLag(seconds, 1e-5, np.zeros(3), 9.0) for seconds in (0.0013, below))
+    assert torque_lags._agreed(found, slow, 8.5).seconds == taken
+
+
 @pytest.mark.parametrize("dead", [-0.002, 0.002])
 def test_a_late_speed_makes_no_lag_of_the_torque_below_half_the_corner(dead: float) -> None:
     """The speed's 2.2 ms are felt below 8.5 Hz, and just not below half of that."""
