@@ -27,7 +27,8 @@ def known_part(whole: Evidence, unknown: Mask) -> Evidence:
 
 def known_by(whole: Evidence, added: list[AddedEffect]) -> Evidence:
     """The run as a model sees it that has some effects."""
-    return Evidence.of(whole.model.with_effects(added), whole.samples, list(whole.asked))
+    seen = Evidence.of(whole.model.with_effects(added), whole.samples, list(whole.asked))
+    return replace(seen, whitening=whole.whitening)
 
 
 def with_account(evidence: Evidence, given: Sequence[Found], account: Account) -> Known:

@@ -18,6 +18,7 @@ from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, w
 from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
+from armloop.diagnosis.friction_of_the_day import of_that_day, of_the_day, says_more
 from armloop.diagnosis.homogeneity import are_unlike, as_modelled, is_contradicted, leaves_much, names_of
 from armloop.diagnosis.judgement import CHANCE
 from armloop.diagnosis.onset import account_with_onsets
@@ -140,8 +141,26 @@ def _judged(
     model: ReconstructedModel, logs: Sequence[MotionLog], progress: Progress, jobs: int | None
 ) -> tuple[Diagnosis, Account | None]:
     """The verdict on logs of the same circumstances, and the account that it comes from; None where too little moves."""
-    names = tuple(log.name for log in logs)
     whole = Evidence.of(model, preprocess(logs, model.conditioning), hypotheses(model.arm))
+    found, account = _verdict(whole, logs, progress, jobs)
+    if account is None or (day := of_the_day(whole)) is None:
+        return found, account
+    progress("whether more is told beside the friction of the day")
+    other, _ = _verdict(day[0], logs, progress, jobs)
+    added = other.outcome.added()
+    if any(one.effect.rubs for one in added) and (again := of_the_day(whole, added)) is not None:
+        # what was found took part in what was taken for friction of the day
+        day = again
+        other, _ = _verdict(day[0], logs, progress, jobs)
+    # accounts of several logs are compared as they are weighed at first
+    return of_that_day(model, other, day[1]) if says_more(other, found) else found, account
+
+
+def _verdict(
+    whole: Evidence, logs: Sequence[MotionLog], progress: Progress, jobs: int | None
+) -> tuple[Diagnosis, Account | None]:
+    """The verdict on a run, and the account that it comes from; None where too little moves."""
+    names = tuple(log.name for log in logs)
     contacts = find_contacts(whole, whole.residual([]))
     evidence, untold = without(whole, contacts), list[Contact]()
     if too_still(evidence):
@@ -151,7 +170,7 @@ def _judged(
     if too_still(evidence):
         return replace(_by_events_alone(whole, contacts, untold), logs=names), None
     blocks = len(np.unique(evidence.blocks))
-    progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
+    progress(f"searching {len(whole.asked)} hypotheses on {blocks} blocks")
     with Hypotheses(whole, jobs) as panel:
         account = best_account(whole, contacts, progress, panel)
     account = account_with_load(whole, account, progress, jobs, logs) or account

@@ -72,6 +72,29 @@ class _Columns(dict[tuple[_Key, float], Array]):
 
 
 @dataclass(frozen=True, eq=False)
+class Whitening:
+    """Random effects of each joint by itself, of which every regression on a run is freed (generalised least squares).
+
+    Attributes:
+        columns: (N, n, r) torque of each, one standard deviation, N·m (N).
+        memories: (n,) of so many rows that count one is independent.
+        taken: (N, n) torque of them, as they were predicted, that the model has, N·m (N): residuals lack it, rows do not.
+    """
+
+    columns: Array
+    memories: Array
+    taken: Array
+
+    def of(self, rows: Mask, scale: Array) -> list[tuple[Array, Array]]:
+        """Per joint an orthonormal basis (R, r) of its weighted columns at rows (N, n), and which part (r,) of it goes."""
+        found = []
+        for j, own in enumerate(rows.T):
+            U, size, _ = np.linalg.svd(self.columns[own, j] / scale[j], full_matrices=False)
+            found.append((U, 1 - 1 / np.sqrt(1 + size**2 / self.memories[j])))
+        return found
+
+
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """The run, its residual and the weights.
 
@@ -88,6 +111,7 @@ class Evidence:
         known: effects that the columns of a model are those of, beside its own.
         assumed: (n,) the part of ``scale`` by which friction differs from log to log, where too few logs tell that.
         with_assumed: whether the model's own errors hold it.
+        whitening: random effects beside which every hypothesis is asked; none where ``None``.
         fitted: what was fitted to these rows lately, by effects and their shapes.
     """
 
@@ -103,6 +127,7 @@ class Evidence:
     known: tuple[AddedEffect, ...] = ()
     assumed: Array = field(default_factory=lambda: np.zeros(1))
     with_assumed: bool = True
+    whitening: Whitening | None = None
     fitted: OrderedDict[tuple[object, ...], Any] = field(default_factory=OrderedDict, init=False, repr=False)
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
@@ -208,7 +233,7 @@ class Evidence:
     def _model_errors(self) -> Array:
         """(R, r) torque of the model's own errors at the rows that count, weighted."""
         _, places, joints = self.stacking
-        return np.asarray(self.errors[self._places[places], joints] / self.scale[joints, None])
+        return self._whitened(self.errors[self._places[places], joints] / self.scale[joints, None])
 
     @cached_property
     def kept(self) -> Index:
@@ -279,16 +304,30 @@ class Evidence:
         """
         samples, _, joints = self.stacking
         X = np.hstack(columns) if columns else np.zeros((len(joints), 0))
-        return Stacked(X, residual[samples, joints] * self._weight, *self._stacked_alike)
+        if self.whitening is not None:
+            residual = residual + self.whitening.taken
+        y = self._whitened(residual[samples, joints] * self._weight)
+        return Stacked(X, y, *self._stacked_alike)
 
     def weighted(self, effect: Effect, shape: float) -> Array:
         """(R, p) columns of an effect through the run's filter at the stacked rows, over the scale of each row's joint."""
         columns, (_, places, joints) = self.smoothed(effect, shape), self.stacking
         if columns.ndim == 3:
-            return np.asarray(columns[self._places[places], joints] * self._weight[:, None])
+            return self._whitened(columns[self._places[places], joints] * self._weight[:, None])
         X, own = np.zeros((len(joints), columns.shape[1])), self._rows_of[effect.index]
         X[own] = columns[self._places[places[own]]] / self.scale[effect.index]
-        return X
+        return self._whitened(X)
+
+    def _whitened(self, x: Array) -> Array:
+        """Weighted rows (R, ...) less the part of them that random effects may be."""
+        for own, (U, part) in zip(self._rows_of, self._random, strict=True) if self._random else ():
+            x[own] -= (U * part) @ (U.T @ x[own])
+        return x
+
+    @cached_property
+    def _random(self) -> list[tuple[Array, Array]]:
+        """What random effects there are, as :meth:`Whitening.of`."""
+        return [] if self.whitening is None else self.whitening.of(self.rows, self.scale)
 
     @cached_property
     def _weight(self) -> Array:

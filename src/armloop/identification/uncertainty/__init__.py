@@ -2,6 +2,7 @@
 
 from armloop.identification.uncertainty.between_logs import (
     between_logs,
+    friction_directions,
     friction_spread,
     usual_in_words,
 )
@@ -13,6 +14,7 @@ __all__ = [
     "Fitted",
     "between_logs",
     "covariances",
+    "friction_directions",
     "friction_spread",
     "standard_errors",
     "torque_errors",

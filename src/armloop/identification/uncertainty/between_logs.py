@@ -228,23 +228,33 @@ def _apart(b: Array, covariance: Array) -> tuple[Array, Array]:
 def friction_spread(model: ReconstructedModel, samples: Samples) -> Array:
     """(N, n, 2) torque of two independent errors of friction, one standard deviation between logs each.
 
-    Through the samples' filter. The drives of an arm warm up together: it is one error that all joints share, each in its
-    direction in which friction grows. What few logs tell of a variance is less than it may be, and a cold morning is none of
-    many alike: three of these standard deviations are exceeded as rarely as three of a normal variable (Student's t).
+    The drives of an arm warm up together: it is one error that all joints share, each in its direction in which friction
+    grows.
+    """
+    columns, roots = friction_directions(model, samples)
+    return np.asarray(np.einsum("njk,jkl->njl", columns, roots))
+
+
+def friction_directions(model: ReconstructedModel, samples: Samples) -> tuple[Array, Array]:
+    """(N, n, 2) sign of the speed and speed, through the samples' filter, and (n, 2, 2) roots of what friction differs by.
+
+    A root times its transpose is the covariance of a joint's dry level and viscous coefficient. What few logs tell of a
+    variance is less than it may be, and a cold morning is none of many alike: three of these standard deviations are
+    exceeded as rarely as three of a normal variable (Student's t).
     """
     v = samples.motion.v
-    torque = np.zeros((*v.shape, 2))
+    roots = np.zeros((v.shape[1], 2, 2))
     kept = model.uncertainty.get("between_logs") or []
     known = model.uncertainty.get("between_logs_known", "different") != "assumed"
     freedom = min(model.uncertainty.get("between_logs_freedom") or np.inf, _TAILS)
     wider = float(t.isf(norm.sf(3.0), freedom)) / 3.0 if known else 1.0
-    columns = smooth(samples, np.stack([np.sign(v), v], axis=2)) if any(kept) else torque
     for j, T in enumerate(kept):
         if T is not None:
             values, vectors = np.linalg.eigh(np.array(T))
             vectors *= wider * np.where([1.0, np.mean(np.abs(v[:, j]))] @ vectors < 0, -1.0, 1.0)
-            torque[:, j] = columns[:, j] @ (vectors * np.sqrt(np.maximum(values, 0.0)))
-    return torque
+            roots[j] = vectors * np.sqrt(np.maximum(values, 0.0))
+    signs = np.stack([np.sign(v), v], axis=2)
+    return smooth(samples, signs) if roots.any() else signs, roots
 
 
 def usual_in_words() -> str:

@@ -1,0 +1,126 @@
+"""Random effects of a run's friction, marginalised by generalised least squares: what is there beside friction of the day.
+
+Where a model's training logs differ in friction, as where drives warm up, a run's residual is weighed by that, and effects
+below it are not seen. Friction of the day has a shape, though: a dry level and a viscous coefficient of each joint, of a
+covariance that the logs tell. Here every hypothesis is asked beside it: rows are whitened by the covariance of a mixed
+model, 1 + Z Z' (Aitken's generalised least squares), and weighed by what the model leaves of a log that it knows. Of
+whatever looks at the residual itself the friction is taken off first, by its best linear unbiased prediction (Henderson,
+Biometrics 31, 1975), beside what was found.
+
+Friction that changed is found in the direction in which it does not differ: dry friction where drives that warm up differ by
+viscous friction. In the other direction only the first weighing tells whether it is more than what differs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armloop.diagnosis.evidence import Evidence, Whitening
+from armloop.diagnosis.verdict import Diagnosis
+from armloop.identification.uncertainty import friction_directions
+from armloop.laws.effects import effect
+from armloop.laws.effects.base import Estimate
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.regression.embedded import ITERATIONS
+from armloop.util.arrays import Array
+
+#: Friction of the day is asked for where it is this part of a joint's baseline or more.
+_FELT = 0.5
+#: What is said of a verdict beside it.
+_SAID = (
+    "Friction differs from log to log by so much that it would hide some of this: it was judged beside the run's own dry "
+    "and viscous friction, as far as that is within what differs, and by what the model leaves of logs that it knows"
+)
+#: Degrees of freedom of Student's t, by which samples that an event or an effect moves weigh less.
+_FREEDOM = 4.0
+
+
+def of_the_day(
+    whole: Evidence, known: Sequence[AddedEffect] = ()
+) -> tuple[Evidence, list[AddedEffect]] | None:
+    """The run beside its own friction, and that; None where friction does not differ between the training logs by much.
+
+    Args:
+        whole: the run, weighed by what friction differs by.
+        known: what was found beside it.
+    """
+    model = whole.model
+    if model.uncertainty.get("between_logs_known") != "different":
+        return None
+    alone = replace(model, uncertainty={**model.uncertainty, "between_logs": None})
+    bare = Evidence.of(alone, whole.samples, list(whole.asked))
+    between = np.sqrt(np.maximum(whole.scale**2 - bare.scale**2, 0.0))
+    if not (between > _FELT * whole.scale).any():
+        return None
+    directions, roots = friction_directions(model, whole.samples)
+    residual, added = bare.left_by(alone.with_effects(known)), list[AddedEffect]()
+    taken, memories = np.zeros_like(residual), np.ones(model.arm.n)
+    for j in range(model.arm.n):
+        rows = np.flatnonzero(bare.rows[:, j])
+        if not roots[j].any() or not len(rows):
+            continue
+        memories[j] = _memory(bare, j)
+        Z = directions[rows, j] @ roots[j] / bare.scale[j]
+        own = roots[j] @ _predicted(Z, residual[rows, j] / bare.scale[j], memories[j])
+        taken[:, j] = directions[:, j] @ own
+        added += [_friction(name, j + 1, float(value)) for name, value in zip(_KINDS, own, strict=True)]
+    day = Evidence.of(alone.with_effects(added), whole.samples, list(whole.asked))
+    columns = np.einsum("njk,jkl->njl", directions, roots)
+    return replace(day, whitening=Whitening(columns, memories, taken)), added
+
+
+def of_that_day(model: ReconstructedModel, found: Diagnosis, friction: Sequence[AddedEffect]) -> Diagnosis:
+    """A verdict beside the friction of the day, with a sentence on that, and of the model without it.
+
+    Args:
+        model: as it was made.
+        friction: what :func:`of_the_day` took off.
+    """
+    effects = tuple(added for added in found.model.effects if not any(added is one for one in friction))
+    standing = replace(found.standing, reasons=[_SAID, *found.standing.reasons])
+    return replace(found, model=replace(model, effects=effects), standing=standing)
+
+
+def says_more(found: Diagnosis, other: Diagnosis) -> bool:
+    """Whether a verdict beside the friction of the day is taken in the place of the other.
+
+    It must name something and no more than what is listed. What friction hid is then told, or told better; but friction that
+    is more than what differs is named by the other alone.
+    """
+    if found.verdict != "effects_found" or found.laws:
+        return False
+    mine, others = set(found.named), set(other.named)
+    return bool(mine - others) or mine == others
+
+
+_KINDS = ("coulomb_friction", "viscous_friction")
+
+
+def _friction(name: str, joint: int, value: float) -> AddedEffect:
+    kind = effect(name, joint)
+    return AddedEffect(kind, {parameter.name: Estimate(value, 0.0, "") for parameter in kind.parameters})
+
+
+def _memory(evidence: Evidence, j: int) -> float:
+    """How many of a joint's rows that count say as much as one: its residual remembers so many."""
+    joints = evidence.model.baseline.get("joints") or []
+    seconds = (joints[j].get("correlation_time") if j < len(joints) else None) or 0.0
+    time = evidence.samples.motion.time[evidence.rows[:, j]]
+    period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    return max(1.0, seconds / period) if period > 0 else 1.0
+
+
+def _predicted(Z: Array, y: Array, memory: float) -> Array:
+    """(k,) random effects of unit variance that rows y (R,) show by columns Z (R, k), robustly."""
+    b: Array = np.zeros(Z.shape[1])
+    weight: Array = np.ones(len(y))
+    for _ in range(ITERATIONS):
+        W = Z * weight[:, None] / memory
+        b = np.linalg.solve(W.T @ Z + np.eye(len(b)), W.T @ y).astype(float)
+        left = y - Z @ b
+        size = max(float(np.median(np.abs(left))) / 0.6745, 1.0)
+        weight = (_FREEDOM + 1) / (_FREEDOM + (left / size) ** 2)
+    return b

@@ -1,0 +1,159 @@
+"""Drives that warm up: what changed in a run is told beside friction that differs from log to log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import fractional_matrix_power
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+
+from armloop.data.log import MotionLog
+from armloop.data.signals import preprocess
+from armloop.diagnosis import diagnose, friction_of_the_day
+from armloop.diagnosis.evidence import Evidence, Whitening
+from armloop.diagnosis.friction_of_the_day import of_the_day, says_more
+from armloop.identification.reconstruction import Options, reconstruct
+from armloop.laws.effects import hypotheses
+from armloop.model import ReconstructedModel
+
+#: By how much the grease of three days differs, and how much thinner or thicker it is than in the mean.
+VISCOUS, DAYS = np.array([4.0, 3.0, 1.0]), (0.0, 0.15, 0.4)
+
+
+def run(seed: int, warmth: float, gain: float = 1.0, dry: float = 0.0, push: float = 0.0) -> MotionLog:
+    """A run on a day; what joint 2 reads of its torque, its dry friction, and what pushes it for a second."""
+    motion = fourier_motion(30.0, 100.0, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+    tau += warmth * VISCOUS * motion.v
+    tau[:, 1] += dry * np.sign(motion.v[:, 1]) + push * ((motion.time > 12) & (motion.time < 13))
+    tau[:, 1] *= gain
+    return measured(motion, tau, seed, name=f"run_{seed}")
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    logs = [run(k, day) for k, day in enumerate(DAYS, 1)]
+    return reconstruct(logs, three_axis(), library="rigid-body", options=Options(parts=False)).model
+
+
+def evidence(model: ReconstructedModel, log: MotionLog) -> Evidence:
+    return Evidence.of(model, preprocess([log], model.conditioning), hypotheses(model.arm))
+
+
+def test_friction_differs_by_more_than_the_model_leaves(model: ReconstructedModel) -> None:
+    whole = evidence(model, run(7, 0.1))
+    found = of_the_day(whole)
+    assert model.uncertainty["between_logs_known"] == "different" and found is not None
+    day, _ = found
+    assert (day.scale < 0.5 * whole.scale).all()
+    # what is taken off is friction: what the model leaves else is its own residual
+    assert np.sqrt(np.mean(day.residual([])[day.rows] ** 2)) < 2 * np.sqrt(np.mean(day.scale**2))
+
+
+@pytest.mark.parametrize("day", [-0.1, 0.2, 0.5])
+def test_friction_of_another_day_is_no_change(model: ReconstructedModel, day: float) -> None:
+    assert diagnose(model, [run(8, day)], jobs=1).named == []
+
+
+def test_a_gain_is_told_by_itself_and_the_model_is_as_it_was_made(model: ReconstructedModel) -> None:
+    found = diagnose(model, [run(9, 0.3, gain=1.1)], jobs=1)
+    assert found.named == [("torque_gain", 2)] and found.reasons[0] == friction_of_the_day._SAID
+    gain = found.outcome.added()[0].parameters["gain"]
+    assert abs(float(np.asarray(gain.value)) - 1.1) < 3 * float(np.asarray(gain.std_error)) < 0.02
+    assert [added.effect.name for added in found.model.effects] == ["torque_gain"]
+    assert found.model.uncertainty["between_logs"] == model.uncertainty["between_logs"]
+
+
+def test_dry_friction_is_told_where_drives_that_warm_up_differ_by_viscous_friction(
+    model: ReconstructedModel,
+) -> None:
+    """Found beside the friction of the day, of which it is no part then."""
+    found = diagnose(model, [run(10, 0.3, dry=0.8)], jobs=1)
+    assert found.named == [("coulomb_friction", 2)]
+    level = found.outcome.added()[0].parameters["level"]
+    assert abs(float(np.asarray(level.value)) - 0.8) < 3 * float(np.asarray(level.std_error)) < 0.2
+    # nor does what is left hold any of it
+    assert (np.array(found.errors()["after"]) < 1.5 * found.evidence.scale).all()
+
+
+def test_a_push_is_seen_that_friction_of_another_day_would_hide(model: ReconstructedModel) -> None:
+    (event,) = diagnose(model, [run(9, 0.3, push=3.0)], jobs=1).contacts
+    start, end = (float(np.asarray(event.added.parameters[key].value)) for key in ("start", "end"))
+    assert event.added.effect.joint == 2 and abs(start - 12) < 0.3 and abs(end - 13) < 0.3
+
+
+def test_rows_are_whitened_by_the_covariance_of_a_mixed_model() -> None:
+    rng, memory = np.random.default_rng(0), 3.0
+    columns = rng.normal(size=(40, 2, 2)) * [5.0, 0.3]
+    rows, scale = rng.random((40, 2)) < 0.7, np.array([0.5, 2.0])
+    whitening = Whitening(columns, np.array([memory, 1.0]), np.zeros((40, 2)))
+    U, part = whitening.of(rows, scale)[0]
+    Z = columns[rows[:, 0], 0] / 0.5
+    root = fractional_matrix_power(np.eye(len(Z)) + Z @ Z.T / memory, -0.5)
+    np.testing.assert_allclose(np.eye(len(Z)) - (U * part) @ U.T, root, atol=1e-9)
+
+
+def test_rows_have_what_was_taken_off_and_every_part_of_a_regression_is_freed(
+    model: ReconstructedModel,
+) -> None:
+    whole = evidence(model, run(7, 0.1))
+    found = of_the_day(whole)
+    assert found is not None
+    day = found[0]
+    (U, part), j = day._random[0], 0
+    own = day.stacking[2] == j
+    free = np.eye(int(own.sum())) - (U * part) @ U.T
+    y = (whole.residual([])[day.rows] / day.scale[day.stacking[2]])[own]
+    np.testing.assert_allclose(day.stack(day.residual([]), []).y[own], free @ y, atol=1e-8)
+    plain = replace(day, whitening=None)
+    for name, joint in (("coulomb_friction", 1), ("payload", None)):
+        kind = next(e for e in day.asked if e.name == name and e.joint == joint)
+        X = plain.weighted(kind, 0.0)[own]
+        np.testing.assert_allclose(day.weighted(kind, 0.0)[own], free @ X, atol=1e-8 * np.abs(X).max())
+    errors = plain.stack(plain.residual([]), []).model_errors[own]
+    np.testing.assert_allclose(day.stack(day.residual([]), []).model_errors[own], free @ errors, atol=1e-8)
+
+
+def test_friction_of_the_day_is_predicted_as_far_as_rows_tell_it_and_a_burst_is_none() -> None:
+    rng = np.random.default_rng(1)
+    Z = rng.normal(size=(2000, 2))
+    y = Z @ [1.5, -0.5] + rng.normal(size=2000)
+    y[100:160] += 40.0 * np.sign(Z[100:160, 0])
+    np.testing.assert_allclose(friction_of_the_day._predicted(Z, y, 1.0), [1.5, -0.5], atol=0.1)
+    # of rows that all say the same there are few: a prediction is drawn to none
+    np.testing.assert_allclose(friction_of_the_day._predicted(Z, y, 2000.0), [0.75, -0.25], atol=0.1)
+
+
+def test_friction_that_logs_do_not_tell_or_that_is_small_is_no_matter(model: ReconstructedModel) -> None:
+    log = run(7, 0.1)
+    for known in ("assumed", "alike"):
+        other = replace(model, uncertainty={**model.uncertainty, "between_logs_known": known})
+        assert of_the_day(evidence(other, log)) is None
+    small = [None if T is None else (1e-4 * np.array(T)).tolist() for T in model.uncertainty["between_logs"]]
+    assert (
+        of_the_day(evidence(replace(model, uncertainty={**model.uncertainty, "between_logs": small}), log))
+        is None
+    )
+
+
+@pytest.mark.parametrize(
+    ("beside", "plain", "taken"),
+    [
+        ([("payload", None), ("coulomb_friction", 2)], [("payload", None)], True),
+        ([("elastic_cable", None)], [("coupling_spring", 2)], True),
+        ([("payload", None)], [("payload", None)], True),
+        ([("payload", None)], [("payload", None), ("viscous_friction", 1)], False),
+        ([("payload", None)], [], True),
+    ],
+)
+def test_what_names_less_is_not_taken(beside: Any, plain: Any, taken: bool) -> None:
+    other: Any = SimpleNamespace(named=plain)
+    found: Any = SimpleNamespace(verdict="effects_found", laws=[], named=beside)
+    assert says_more(found, other) is taken
+    for verdict, laws in (("no_effect", []), ("effects_found", ["a law"])):
+        nothing: Any = SimpleNamespace(verdict=verdict, laws=laws, named=beside)
+        assert not says_more(nothing, other)
