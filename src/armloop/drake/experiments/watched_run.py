@@ -12,12 +12,11 @@ from pydrake.systems.primitives import Adder, DiscreteDerivative, LogVectorOutpu
 
 from armloop.drake.control.adaptive_feedforward import AdaptiveFeedforward
 from armloop.drake.control.pid import PidController
-from armloop.drake.control.reference import ReferenceSource
 from armloop.drake.control.residual_monitor import ResidualMonitor
+from armloop.drake.experiments.closed_loop import add_arm_under
 from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.experiments.tracking import TrackingResult, score
 from armloop.drake.plant.fault_injection import Effects
-from armloop.drake.plant.plant import ArmPlant
 from armloop.model import ReconstructedModel
 from armloop.monitoring.blockwise import Known
 from armloop.util.arrays import Array
@@ -58,19 +57,15 @@ def run_watched(
         scenario's instruments
     adapt : whether what is named is supplied
     """
-    arm, config = scenario.plant.arm, scenario.plant.config
-    n, step = arm.n, config.time_step
+    config = scenario.plant.config
+    n, step = scenario.plant.arm.n, config.time_step
     builder = DiagramBuilder()
-    plant = builder.AddSystem(ArmPlant(arm, config.friction, effects=config.with_rotors(), time_step=step))
-    source = builder.AddNamedSystem("reference", ReferenceSource(scenario.reference, step, model, 3))
-    law = builder.AddNamedSystem(
-        "pid", PidController(scenario.gains, step, config.instruments.resolution(arm))
-    )
-    for port in ("q_ref", "v_ref"):
-        builder.Connect(source.GetOutputPort(port), law.GetInputPort(port))
+    pid = PidController(scenario.gains, step, config.instruments.resolution(scenario.plant.arm))
+    arm = add_arm_under(builder, scenario.plant, pid, scenario.reference, model, name="pid")
+    plant, source = arm.plant, arm.reference
+    # what is named is added to the feedforward on its way
+    builder.Disconnect(source.GetOutputPort("tau_ff"), pid.GetInputPort("tau_ff"))
     state = plant.GetOutputPort("state")
-    builder.Connect(state, law.GetInputPort("state"))
-    builder.Connect(law.GetOutputPort("tau"), plant.GetInputPort("tau"))
     monitor = builder.AddNamedSystem("monitor", ResidualMonitor(model, learn=learn))
     derivative = builder.AddSystem(DiscreteDerivative(n, step))
     speeds = builder.AddSystem(MatrixGain(np.hstack([np.zeros((n, n)), np.eye(n)])))
@@ -92,21 +87,20 @@ def run_watched(
     builder.Connect(state, adaptive.GetInputPort("state"))
     builder.Connect(monitor.GetOutputPort("named"), adaptive.GetInputPort("named"))
     holds = builder.AddSystem(MatrixGain(np.diag(scenario.gains.ki)))
-    builder.Connect(law.GetOutputPort("integral"), holds.get_input_port())
+    builder.Connect(pid.GetOutputPort("integral"), holds.get_input_port())
     builder.Connect(holds.get_output_port(), adaptive.GetInputPort("integral"))
     total = builder.AddSystem(Adder(2, n))
     gain = builder.AddSystem(MatrixGain((1.0 if adapt else 0.0) * np.eye(n)))
     builder.Connect(adaptive.GetOutputPort("tau_ff"), gain.get_input_port())
     builder.Connect(source.GetOutputPort("tau_ff"), total.get_input_port(0))
     builder.Connect(gain.get_output_port(), total.get_input_port(1))
-    builder.Connect(total.get_output_port(), law.GetInputPort("tau_ff"))
-    ports = (state, plant.GetOutputPort("tau_drive"), law.GetOutputPort("tau"), gain.get_output_port())
+    builder.Connect(total.get_output_port(), pid.GetInputPort("tau_ff"))
+    ports = (state, plant.GetOutputPort("tau_drive"), pid.GetOutputPort("tau"), gain.get_output_port())
     logs = [LogVectorOutput(port, builder, step) for port in ports]
     simulator = Simulator(builder.Build())
     context = simulator.get_mutable_context()
     noise.SetRandomContext(noise.GetMyMutableContextFromRoot(context), RandomGenerator(scenario.seed))
-    q, v, _ = (table[0] for table in source.tables)
-    plant.set_state(context, q, v)
+    arm.start_on_reference(context)
     moments = {"change": np.inf, "alarm": np.nan, "named": np.nan}
 
     def look(root: Context) -> EventStatus:
