@@ -54,7 +54,6 @@ def test_what_excludes_each_other_is_refused() -> None:
     [
         ("max_order", 7, "give 1 to 6"),
         ("speed", 0.0, "give a positive speed"),
-        ("speed", float("nan"), "give a pos"),
     ],
 )
 def test_a_value_out_of_bounds_is_named_as_it_was_given(name: str, value: float, wrong: str) -> None:
@@ -63,7 +62,24 @@ def test_a_value_out_of_bounds_is_named_as_it_was_given(name: str, value: float,
         parsed("a", "--out", "x", option_name, str(value))
     with pytest.raises(InputError, match=f"^{name} {value:g}: {wrong}"):
         Example.checked(**{name: value})
+    with pytest.raises(InputError, match=r"^--speed nan: give a positive speed"):
+        parsed("a", "--out", "x", "--speed", "nan")
     Example.checked(max_order=6, speed=0.1, tip=None)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind"),
+    [
+        ("max_order", 2.0, "a whole number"),
+        ("speed", float("inf"), "a finite number"),
+        ("tip", 3, "a word or None"),
+        ("out", None, "a word"),
+        ("fast", 1, "True or False"),
+    ],
+)
+def test_a_value_of_another_type_is_named(name: str, value: object, kind: str) -> None:
+    with pytest.raises(InputError, match=f"^{name} must be {kind}; it is {value}$"):
+        Example.checked(**({"max_order": 7} | {name: value}))  # before any value that is out of bounds
 
 
 def test_shared_options_stand_under_their_heading() -> None:

@@ -116,8 +116,7 @@ def diagnose(
     Raises:
         InputError: a log does not fit the model.
     """
-    require("True or False", adopt=adopt)
-    require("a whole number or None", jobs=jobs)
+    Command.checked(adopt=adopt, jobs=jobs)
     require("a function", progress=progress)
     runs, after = (logs_for(model, as_logs(each)) for each in (logs, held_out))
     require_some(runs)

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from armloop.api.reading import as_arm, require_model
 from armloop.api.shown import displayed, page
 from armloop.commands.excite import Excite as Command
-from armloop.experiment.design import Excitation, Settings, baseline_noise
+from armloop.commands.excite import settings_for
+from armloop.experiment.design import Excitation
 from armloop.experiment.design import excite as run
 from armloop.experiment.excitation import MotionRanges, ranges_with, write_reference
-from armloop.identification.reconstruction.reconstruct import default_conditioning, default_library
 from armloop.model import ReconstructedModel
 from armloop.reports.excitation_tables import measures_table, use_table
 from armloop.robot.arm import Arm, load_arm
@@ -49,7 +49,6 @@ class Reference:
 
     def save(self, path: str | Path, *, rate: float = Command.rate) -> int:
         """Write it as a table (CSV or Parquet) with so many rows per second; returns their number."""
-        require("a finite number", rate=rate)
         Command.checked(rate=rate)
         return write_reference(str(path_of(path)), self.result.reference, rate)
 
@@ -127,43 +126,32 @@ def excite(
     Raises:
         InputError: settings out of range, or limits that exclude any motion.
     """
-    require("a word or None", library=library)
-    require("a word", criterion=criterion)
-    require("a finite number or None", duration=duration, base_frequency=base_frequency)
-    require("a finite number", reserve=reserve)
-    require("a whole number or None", harmonics=harmonics, starts=starts)
-    require("a whole number", order=order, random=random, seed=seed)
+    chosen = {
+        "library": library,
+        "criterion": criterion,
+        "duration": duration,
+        "base_frequency": base_frequency,
+        "harmonics": harmonics,
+        "order": order,
+        "reserve": reserve,
+        "starts": starts,
+        "random": random,
+        "seed": seed,
+    }
+    Command.checked(**chosen)
     require("a function", progress=progress)
-    Command.checked(starts=starts)
     if seed < 0:
         raise InputError(f"seed must not be negative; it is {seed}")
     arm = as_arm(arm)
     if model is not None:
         require_model(model)
         model.arm.require_same(arm, "the model")
-    chosen = library or default_library(arm)
     stated = {"lower": lower, "upper": upper, "velocity": velocity, "acceleration": acceleration}
     given = {
         name: None if values is None else tuple(numbers_of(values, (arm.n,), name).tolist())
         for name, values in ({"noise": noise} | stated).items()
     }
-    level = given.pop("noise")
-    if level is None and model is not None:
-        level = baseline_noise(model.baseline.get("rmse"))
-    settings = Settings(
-        library=chosen,
-        criterion=criterion,
-        duration=duration,
-        base_frequency=base_frequency,
-        harmonics=harmonics,
-        order=order,
-        reserve=reserve,
-        noise=level,
-        cutoff_hz=default_conditioning(chosen).cutoff_hz,
-        starts=starts,
-        random=random,
-        seed=seed,
-    )
+    settings = settings_for(arm, model, given.pop("noise"), chosen)
     ranges = ranges_with(arm, _plants(arm), **given)
     return Reference(run(arm, ranges, settings, model.of_the_drives().predict if model else None, progress))
 

@@ -201,10 +201,8 @@ def reconstruct(
     Raises:
         InputError: logs that do not fit the arm, an unknown option, or too little excitation.
     """
-    require("a word", method=method, estimator=estimator)
-    require("a word or None", library=library)
-    require("a finite number or None", penalty=penalty, cutoff=cutoff, torque_lag=torque_lag)
-    require("a whole number", max_order=max_order)
+    Command.checked(method=method, library=library, estimator=estimator, penalty=penalty)
+    Command.checked(max_order=max_order, cutoff=cutoff, torque_lag=torque_lag)
     require("True or False", physical=physical)
     require("a function", progress=progress)
     given, arm = as_logs(logs), as_arm(arm)
@@ -213,7 +211,6 @@ def reconstruct(
     units = {log.tau_unit for log in given}
     if len(units) != 1:
         raise InputError("reconstruct: give logs, all of them with torques or all with currents")
-    Command.checked(max_order=max_order, cutoff=cutoff, penalty=penalty, torque_lag=torque_lag)
     options = Options(
         sparse=Sparse(estimator, penalty),
         max_order=max_order,

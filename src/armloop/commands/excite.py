@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
 from armloop.commands.arguments import ARM_HELP, Chain, Json, seed
 from armloop.commands.options import argument, flag, option, required, within
 from armloop.commands.ranges import Ranges, numbers, ranges, read_ranges
 from armloop.util.outputs import take_file
+
+if TYPE_CHECKING:
+    from armloop.experiment.design import Settings
+    from armloop.model import ReconstructedModel
+    from armloop.robot.arm import Arm
 
 HELP = "design an exciting reference within an arm's limits, optimised for the library that will be regressed"
 EXAMPLE = "armloop excite three_axis --out reference.csv --compare --report reference.html"
@@ -58,9 +66,8 @@ class Excite(Ranges, Chain, Json):
 def run(options: Excite) -> None:
     """Design an exciting reference and write it."""
     from armloop.commands.shared import arm_of, print_json, progress, take_reference
-    from armloop.experiment.design import Settings, baseline_noise, excite
+    from armloop.experiment.design import excite
     from armloop.experiment.excitation import write_reference
-    from armloop.identification.reconstruction.reconstruct import default_conditioning, default_library
     from armloop.model import load_model
     from armloop.util.files import write_text
     from armloop.util.resources import urdf_names
@@ -68,25 +75,8 @@ def run(options: Excite) -> None:
     take_reference(options.out, "--out")
     take_file(options.report, "--report")
     arm = arm_of(options)
-    library = options.library or default_library(arm)
     model = load_model(options.model, arm) if options.model else None
-    noise = numbers(options.noise, "--noise", arm)
-    if noise is None and model is not None:
-        noise = baseline_noise(model.baseline.get("rmse"))
-    settings = Settings(
-        library=library,
-        criterion=options.criterion,
-        duration=options.duration,
-        base_frequency=options.base_frequency,
-        harmonics=options.harmonics,
-        order=options.order,
-        reserve=options.reserve,
-        noise=noise,
-        cutoff_hz=default_conditioning(library).cutoff_hz,
-        starts=options.starts,
-        seed=options.seed,
-        random=options.random,
-    )
+    settings = settings_for(arm, model, numbers(options.noise, "--noise", arm), vars(options))
     settings.timing(arm.n)  # faults of the options before anything is computed
     whole = options.arm in urdf_names() and not options.lock and options.tip is None
     found = read_ranges(options, arm, options.arm if whole else "urdf")
@@ -116,3 +106,23 @@ def run(options: Excite) -> None:
     for note in result.notes:
         print(wrapped(f"note: {note}"))
     print(f"reference written to {options.out}, {rows} rows")
+
+
+def settings_for(
+    arm: Arm, model: ReconstructedModel | None, noise: tuple[float, ...] | None, chosen: Mapping[str, Any]
+) -> Settings:
+    """The design's settings, chosen by the options' names.
+
+    Where none is given the library is the arm's usual one, and the noise what the model leaves on its own data.
+    """
+    from dataclasses import fields
+
+    from armloop.experiment.design import Settings, baseline_noise
+    from armloop.identification.reconstruction.reconstruct import default_conditioning, default_library
+
+    library = chosen["library"] or default_library(arm)
+    if noise is None and model is not None:
+        noise = baseline_noise(model.baseline.get("rmse"))
+    known = {field.name: chosen[field.name] for field in fields(Settings) if field.name in chosen}
+    cutoff_hz = default_conditioning(library).cutoff_hz
+    return Settings(**{**known, "library": library, "noise": noise, "cutoff_hz": cutoff_hz})

@@ -18,6 +18,10 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 from armloop.util.errors import InputError
+from armloop.util.given import require
+
+#: What Python code must give for an option of a type, as a message says it.
+_KINDS = {"str": "a word", "int": "a whole number", "float": "a finite number", "bool": "True or False"}
 
 
 class Check(NamedTuple):
@@ -142,10 +146,13 @@ class Options:
 
     @classmethod
     def checked(cls, **given: Any) -> None:
-        """Check what a function was given by the options' names; raises ``InputError``."""
-        named = {name: each for _, name, each in cls._all()}
+        """Check what a function was given by the options' names, the types of all first; raises ``InputError``."""
+        named = {name: (part.__annotations__[name], each) for part, name, each in cls._all()}
         for name, value in given.items():
-            _checked(named[name], name, value)
+            kind, or_none, _ = named[name][0].partition(" | None")
+            require(_KINDS[kind] + or_none.replace("|", "or"), **{name: value})
+        for name, value in given.items():
+            _checked(named[name][1], name, value)
 
     @classmethod
     def declare(cls, parser: argparse.ArgumentParser) -> None:
