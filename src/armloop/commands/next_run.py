@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from armloop.commands.options import option
-from armloop.commands.ranges import Ranges, acceleration, ranges, ranges_stated, read_ranges, reserve_stated
+from armloop.commands.ranges import Ranges, acceleration, ranges, ranges_stated, read_ranges
 from armloop.util.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ def wish(options: NextRun, model: ReconstructedModel) -> Wish | None:
     from armloop.diagnosis.next_run import Wish, training_ranges
 
     if options.next_run is None:
-        if ranges_stated(options) or reserve_stated(options) or options.next_run_duration is not None:
+        duration_stated = options.next_run_duration is not None
+        if ranges_stated(options) or options.reserve != Ranges.reserve or duration_stated:
             raise InputError("ranges, reserve and duration are those of --next-run REF.csv: give it, too")
         return None
     take_reference(options.next_run, "--next-run")

@@ -49,11 +49,6 @@ def ranges_stated(options: Ranges) -> bool:
     return any(getattr(options, name) is not None for name in ("ranges", *_NAMES))
 
 
-def reserve_stated(options: Ranges) -> bool:
-    """Whether another reserve than the default is stated."""
-    return bool(options.reserve != Ranges.reserve)
-
-
 def read_ranges(options: Ranges, arm: Arm, plant: str, known: MotionRanges | None = None) -> MotionRanges:
     """The ranges of ``--ranges``, else ``known``, else ``plant``'s, with what the options say; raises ``InputError``."""
     from armloop.experiment.excitation import ranges_with

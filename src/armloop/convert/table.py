@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armloop.convert.clocks import clock_seconds, stamps_of
+from armloop.convert.clocks import stamps_of
 from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
-from armloop.convert.text import TextTable, numbers_of, read_text
+from armloop.convert.text import TextTable, read_text
 from armloop.data.header import JOINT_COLUMN
-from armloop.data.tables import PARQUET, is_number, kind_of
+from armloop.data.tables import PARQUET, kind_of
 from armloop.data.torque_unit import told_unit
 from armloop.util.errors import LogError
 
@@ -75,12 +75,6 @@ def _parquet(path: Path) -> TextTable:
         raise LogError(f"{path}: not a Parquet file; write it anew, or name it .csv if it is text") from error
     made = TextTable({}, [0], [])
     for name in table.column_names:
-        kind = table.schema.field(name).type
-        if is_number(kind) or pyarrow.types.is_boolean(kind):
-            made.columns[name] = numbers_of(table.column(name))
-        elif (clock := clock_seconds(table.column(name))) is not None:
-            made.columns[name], made.units[name] = clock[0], "s"
-            made.notes.append(f"{name}: {clock[1]}")
-        else:
-            made.dropped.append(f"{name} ({kind})")
+        if not made.take(name, table.column(name)):
+            made.dropped.append(f"{name} ({table.schema.field(name).type})")
     return made

@@ -44,6 +44,17 @@ class TextTable:
     twice: list[str] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
 
+    def take(self, name: str, cells: Any) -> bool:
+        """Take a column of pyarrow's if it holds numbers, or a clock's; tell whether it does."""
+        from pyarrow import types
+
+        if is_number(cells.type) or types.is_boolean(cells.type):
+            self.columns[name] = numbers_of(cells)
+        elif (clock := clock_seconds(cells)) is not None:
+            self.columns[name], self.units[name] = clock[0], "s"
+            self.notes.append(f"{name}: {clock[1]}")
+        return name in self.columns
+
     def left_out(self) -> list[str]:
         """What is to be said of the columns that are dropped."""
         return [f"columns left out: {', '.join(self.dropped)}"] if self.dropped else []
@@ -130,9 +141,8 @@ def read_text(path: Path) -> TextTable:
         )
     except pyarrow.ArrowInvalid as error:
         raise _fault(path, body, numbers, separator, len(names_read), error) from error
-    columns: dict[str, Array] = {}
-    dropped: list[str] = []
-    twice: list[str] = []
+    made = TextTable({}, starts, [], units, notes, lines=numbers)
+    columns, dropped = made.columns, made.dropped
     for k, name in enumerate(names_read):
         cells = table.column(k)
         if not name:
@@ -141,12 +151,9 @@ def read_text(path: Path) -> TextTable:
         if name in columns:
             dropped.append(f"{name} (a second column of that name)")
             if not is_number(kind) or not np.array_equal(numbers_of(cells), columns[name], equal_nan=True):
-                twice.append(name)
-        elif is_number(kind) or pyarrow.types.is_boolean(kind):
-            columns[name] = numbers_of(cells)
-        elif (clock := clock_seconds(cells)) is not None:
-            columns[name], units[name] = clock[0], "s"
-            notes.append(f"{name}: {clock[1]}")
+                made.twice.append(name)
+        elif made.take(name, cells):
+            continue
         elif pyarrow.types.is_string(kind):
             # A cell that is no number among numbers is a fault only where the column is needed.
             texts = cells.to_pylist()
@@ -157,7 +164,7 @@ def read_text(path: Path) -> TextTable:
                 columns[name] = numbers_in
         else:
             dropped.append(f"{name} (empty)" if pyarrow.types.is_null(kind) else f"{name} ({kind})")
-    return TextTable(columns, starts, dropped, units, notes, twice, numbers)
+    return made
 
 
 def numbers_of(cells: Any) -> Array:

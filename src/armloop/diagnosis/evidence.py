@@ -28,7 +28,7 @@ from armloop.laws.effects.found import FAR
 from armloop.laws.effects.onset import Onset
 from armloop.laws.effects.spells import Spells
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import Array, Index, Mask, stretches
+from armloop.util.arrays import Array, Index, Mask, filled, stretches
 from armloop.util.interpolation import cubic_nodes
 
 #: Number of folds.
@@ -136,8 +136,7 @@ class Evidence:
     @staticmethod
     def of(model: ReconstructedModel, samples: Samples, effects: list[Effect]) -> Evidence:
         """Evidence of a run for a model; ``effects`` are those that will be asked about."""
-        scale = np.array([float(x) if x else np.nan for x in model.baseline.get("rmse", [])] or [np.nan])
-        scale = np.resize(scale, samples.motion.joints)
+        scale = filled(model.baseline.get("rmse"), samples.motion.joints)
         # A model without a baseline (written by hand, or noise-free) is weighed by the torque itself.
         own = 0.01 * np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-9
         scale = np.where(np.isfinite(scale), np.maximum(scale, 1e-3 * own), own)
@@ -145,8 +144,8 @@ class Evidence:
         between = np.sqrt(np.mean((friction_spread(model, samples) ** 2).sum(axis=2), axis=0))
         scale = np.hypot(scale, between)
         assumed = between * (model.uncertainty.get("between_logs_known") == "assumed")
-        worst = np.array([float(x or 0.0) for x in model.baseline.get("worst", [])] or [0.0])
-        variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
+        worst = filled(model.baseline.get("worst"), samples.motion.joints, 0.0)
+        variation = np.maximum(worst / scale, 1.0) ** 2
         blocks = block_numbers(samples.motion, _block_seconds(samples.motion, shortest_block(model)))
         context = filtered_context(model, samples, effects)
         samples = without_shared_standstill(samples, model, scale)

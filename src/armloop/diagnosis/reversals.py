@@ -37,7 +37,7 @@ from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.friction import FrictionLaw
 from armloop.robot.arm import Arm
-from armloop.util.arrays import TINY, Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask, filled
 from armloop.util.progress import Progress
 
 #: An effect must remove this part of a joint's squared error at reversals, so that it was a multiple of what remains;
@@ -221,8 +221,8 @@ class _View:
     def of(evidence: Evidence, fit: Fit, judged: Mask) -> _View:
         samples, rows = evidence.samples, evidence.rows
         torque = np.sqrt(np.sum(samples.tau**2, axis=0, where=rows) / np.maximum(rows.sum(axis=0), 1))
-        left = [x or 0.0 for x in evidence.model.baseline.get("reversals") or [0.0]]
-        noticeable, usual = ((x / evidence.scale) ** 2 for x in (NOTICEABLE * torque, np.array(left)))
+        left = filled(evidence.model.baseline.get("reversals"), len(torque), 0.0)
+        noticeable, usual = ((x / evidence.scale) ** 2 for x in (NOTICEABLE * torque, left))
         return _View(judged[rows], fit.stacked.joint, fit.stacked.block, noticeable, usual)
 
     def mean_squares(self, fit: Fit) -> Array:

@@ -19,7 +19,7 @@ from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, preprocess, smooth
 from armloop.model import ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue, known_context
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, filled
 from armloop.util.errors import LogError
 
 #: Longest block, s.
@@ -86,8 +86,7 @@ class RestingError(LogError):
 def residual_scale(model: ReconstructedModel, samples: Samples | None = None) -> Array:
     """(n,) RMSE that the model leaves on held-out data of its own training runs; a hundredth of the torque without it."""
     n = model.arm.n
-    scale = np.resize([float(x) if x else np.nan for x in model.baseline.get("rmse", [])] or [np.nan], n)
-    rms = np.resize([float(x) if x else np.nan for x in model.baseline.get("rms", [])] or [np.nan], n)
+    scale, rms = (filled(model.baseline.get(key), n) for key in ("rmse", "rms"))
     if samples is not None:
         rms = np.where(np.isfinite(rms), rms, np.sqrt(np.mean(samples.tau**2, axis=0)))
     least = 1e-3 * np.where(np.isfinite(rms), rms, 1.0) + 1e-12

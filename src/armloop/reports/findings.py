@@ -10,7 +10,7 @@ from armloop.diagnosis.pushes import FEW
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.laws.effects.time_delay import TimeDelay
 from armloop.reports.prose import Prose
-from armloop.reports.words import counted, effect_label, listed, percent, place, unit
+from armloop.reports.words import counted, effect_label, from_to, listed, percent, place, unit
 from armloop.reports.words import joints as of_joints
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def confounded(diagnosis: Diagnosis) -> list[tuple[str, list[tuple[str, str]]]]:
             place(each[0][1]) + _numbered([number for number, _ in each if number]),
             [
                 (
-                    f"{place(r)} ({_shares([one['alternatives'][i]['share'] for _, one in each])})",
+                    f"{place(r)} ({from_to([one['alternatives'][i]['share'] for _, one in each], percent)})",
                     str(r["why"]),
                 )
                 for i, r in enumerate(each[0][1]["alternatives"])
@@ -142,12 +142,6 @@ def confounded(diagnosis: Diagnosis) -> list[tuple[str, list[tuple[str, str]]]]:
 def _numbered(events: list[int]) -> str:
     """Events by their numbers, in brackets; nothing of what is no event."""
     return f" (event{'s' * (len(events) > 1)} {listed([str(k) for k in events])})" if events else ""
-
-
-def _shares(shares: list[float]) -> str:
-    """Parts of what can be explained: one, or the least and the largest."""
-    least, most = percent(min(shares)), percent(max(shares))
-    return least if least == most else f"{least} to {most}"
 
 
 def alternatives(diagnosis: Diagnosis) -> list[str]:

@@ -14,6 +14,7 @@ from armloop.reports import paper as published
 from armloop.reports.words import (
     MISSING,
     controller,
+    from_to,
     number,
     percent,
     unit,
@@ -154,7 +155,7 @@ def steps_table(reports: Sequence[StepReport]) -> Table:
                 report.candidates,
                 report.independent,
                 " / ".join(map(str, report.terms)),
-                _from_to(report.samples),
+                from_to(report.samples),
                 percent(min(chosen)) if chosen else MISSING,
             ]
         )
@@ -168,12 +169,6 @@ def steps_table(reports: Sequence[StepReport]) -> Table:
         "error choosing orders",
     ]
     return make_table(headers, rows, "Steps of the reconstruction")
-
-
-def _from_to(counts: Sequence[int]) -> str:
-    """The least and the most of what each joint has."""
-    least, most = min(counts, default=0), max(counts, default=0)
-    return str(most) if least == most else f"{least} to {most}"
 
 
 def compared(libraries: Sequence[Contender]) -> bool:

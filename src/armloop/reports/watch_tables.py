@@ -45,10 +45,10 @@ def alarms_table(alarms: list[dict[str, Any]], title: str | None = None) -> Tabl
     return make_table(headers, rows, title, left=(0, 1, 2, 3, 4, 5))
 
 
-def aside_table(aside: list[dict[str, Any]], title: str | None = None) -> Table:
+def aside_table(aside: list[dict[str, Any]]) -> Table:
     """Logs that were set aside and why."""
     rows = [[item["arm"] or None, item["reason"]] for item in aside]
-    return make_table(["arm", "why"], rows, title, left=(0, 1))
+    return make_table(["arm", "why"], rows, left=(0, 1))
 
 
 def alarm_words(alarm: dict[str, Any]) -> list[str]:

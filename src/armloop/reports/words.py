@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -138,6 +138,12 @@ def counted(count: int, singular: str, plural: str | None = None) -> str:
     """``1 run``, ``12 345 runs``."""
     digits = f"{count:,}".replace(",", "\u202f")
     return f"{digits} {singular if count == 1 else plural or singular + 's'}"
+
+
+def from_to(values: Sequence[float], written: Callable[[float], str] = str) -> str:
+    """The least and the largest of some values, as ``3 to 5``; one where both read alike."""
+    least, most = written(min(values, default=0)), written(max(values, default=0))
+    return most if least == most else f"{least} to {most}"
 
 
 def listed(items: Sequence[str]) -> str:

@@ -1,5 +1,7 @@
 """Types of numpy arrays, as all numerics write them, and stretches of a mask."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,11 @@ Mask = NDArray[np.bool_]
 TINY = 1e-300
 #: Times the median absolute deviation of normal numbers is their standard deviation.
 PER_MEDIAN = 1.4826
+
+
+def filled(values: Sequence[float | None] | None, n: int, missing: float = np.nan) -> Array:
+    """(n,) numbers of joints, ``missing`` for each that is not known, or zero, and for all where there are none."""
+    return np.resize([float(x) if x else missing for x in values or ()] or [missing], n)
 
 
 def stretches(mask: Mask) -> Index:

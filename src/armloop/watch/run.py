@@ -15,10 +15,8 @@ from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.ingest import Counts, ingest
 from armloop.watch.running import stored
 from armloop.watch.sources import LogFile
-from armloop.watch.store import Store
+from armloop.watch.store import SCHEMA, Store
 from armloop.watch.verdicts import Options, Task, test_arm
-
-SCHEMA = "armloop/watch/1"
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from armloop.drake.experiments.tracking import TrackingResult, score
 from armloop.drake.plant.fault_injection import Effects
 from armloop.model import ReconstructedModel
 from armloop.monitoring.blockwise import Known
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, filled
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ def run_watched(
     builder.Connect(state, speeds.get_input_port())
     builder.Connect(speeds.get_output_port(), derivative.get_input_port())
     noise = builder.AddSystem(RandomSource(RandomDistribution.kGaussian, n, 10 * step))
-    rms = np.resize([float(x or 0.0) for x in model.baseline.get("rms", [])] or [0.0], n)
+    rms = filled(model.baseline.get("rms"), n, 0.0)
     size = builder.AddSystem(MatrixGain(np.diag(config.instruments.torque_noise * rms)))
     measured = builder.AddSystem(Adder(2, n))
     builder.Connect(noise.get_output_port(), size.get_input_port())

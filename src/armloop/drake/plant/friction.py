@@ -31,8 +31,7 @@ class JointFriction:
     viscous: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("static", "coulomb", "stribeck_velocity", "viscous"):
-            require("a finite number", **{name: getattr(self, name)})
+        require("a finite number", **vars(self))
         if self.coulomb < 0 or self.viscous < 0:
             raise InputError(f"coulomb {self.coulomb} and viscous {self.viscous} must not be negative")
         if self.static < self.coulomb:

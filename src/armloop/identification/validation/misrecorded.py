@@ -21,7 +21,7 @@ from armloop.identification.reconstruction.readings import Reading, readings
 from armloop.identification.scoring import residual, score_errors
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, filled
 from armloop.util.doubts import warn
 from armloop.util.errors import InputError
 
@@ -138,10 +138,7 @@ def _usual(model: ReconstructedModel, samples: Samples) -> Array:
     As on the worst tenth of them where a joint slides, and of the samples in which it creeps as on those in which it crept.
     """
     n, ranges = samples.motion.joints, model.history.get("range")
-    worst, slow = (
-        np.resize([float(x or 0.0) for x in model.baseline.get(key) or [0.0]], n)
-        for key in ("worst", "creeping")
-    )
+    worst, slow = (filled(model.baseline.get(key), n, 0.0) for key in ("worst", "creeping"))
     creeps = creeping(samples, np.asarray(ranges[1]) if ranges else np.zeros(n)).sum(axis=0)
     left = np.sqrt(worst**2 + slow**2 * creeps / np.maximum(samples.moving.sum(axis=0), 1))
     tau = np.sqrt(np.mean(samples.tau**2, axis=0, where=samples.moving | ~samples.moving.any(axis=0)))
