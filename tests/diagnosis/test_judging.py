@@ -14,11 +14,13 @@ from armloop.data.motion import Motion
 from armloop.diagnosis import unlisted
 from armloop.diagnosis.contacts import _seen_whole
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
-from armloop.diagnosis.fit import NOTHING, Fit
+from armloop.diagnosis.fit import Fit, Solution
 from armloop.diagnosis.judgement import SIGNIFICANCE, is_worth, lead, lead_of
 from armloop.laws.effects import Estimate, effect
 from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
+
+NOTHING = Solution(np.zeros(0), (), np.zeros((0, 0)), ())
 
 
 def left(held_out: np.ndarray, block: np.ndarray, joint: np.ndarray | None = None) -> Fit:

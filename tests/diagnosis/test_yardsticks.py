@@ -13,7 +13,7 @@ from armloop.data.blocks import halves
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import evidence as evidences
 from armloop.diagnosis.evidence import Evidence, Stacked
-from armloop.diagnosis.fit import NOTHING, Fit, Shape
+from armloop.diagnosis.fit import Fit, Shape, Solution
 from armloop.diagnosis.judgement import (
     enough,
     gain,
@@ -22,6 +22,8 @@ from armloop.diagnosis.judgement import (
     lead_of,
     times_enough,
 )
+
+NOTHING = Solution(np.zeros(0), (), np.zeros((0, 0)), ())
 
 
 def samples(

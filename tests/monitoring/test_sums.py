@@ -150,7 +150,7 @@ def test_warm_up_is_learned_and_is_no_wear(known: str) -> None:
     )
     listed = [Stream("viscous_friction", 1, None, 0)]
     cleared = adjust(units, values[:, None], listed, healthy=20)
-    assert cleared.known == known and cleared.learned.all()
+    assert cleared.known == known and cleared.warmth.any()
     assert cleared.values.std() < 0.2 * values.std()
     untold = adjust(units_of(values, nothing, nothing), values[:, None], listed, healthy=20)
     assert untold.known is None

@@ -53,10 +53,6 @@ class Solution(NamedTuple):
     values: Sequence[float]
 
 
-#: The solution of no effects.
-NOTHING = Solution(np.zeros(0), (), np.zeros((0, 0)), ())
-
-
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Several effects fitted together to one residual.

@@ -38,13 +38,11 @@ class Adjusted:
     Attributes:
         values: (U, S) scores.
         known: what tells how warm the arm is: ``temperature``, ``since_start`` or nothing.
-        learned: (S,) whether a dependence was found and taken out.
         warmth: (U, n) what the friction of each joint was found to follow; zero where nothing was found.
     """
 
     values: Array
     known: str | None
-    learned: NDArray[np.bool_]
     warmth: Array
 
 
@@ -55,15 +53,14 @@ def adjust(units: Units, values: Array, listed: list[Stream], healthy: int) -> A
     learned from, what is taken out was learned from the others of them (leave-one-out), so that they remain comparable
     to later ones. Beyond the warmth that was learned, the nearest that was holds.
     """
-    S = values.shape[1]
-    learned, out = np.zeros(S, dtype=bool), values.copy()
+    out = values.copy()
     warmth = np.zeros((units.count, units.rows.shape[1]))
     if np.isfinite(units.temperature[:healthy]).any():
         known = "temperature"
     elif np.isfinite(units.since_start[:healthy]).any():
         known = "since_start"
     else:
-        return Adjusted(out, None, learned, warmth)
+        return Adjusted(out, None, warmth)
     worths = np.zeros(units.rows.shape[1])
     for s, stream in enumerate(listed):
         if not warms(stream.name) or stream.joint is None:
@@ -77,11 +74,11 @@ def adjust(units: Units, values: Array, listed: list[Stream], healthy: int) -> A
         if found:
             worth, line, x = max(found, key=lambda fit: fit[0])
             if worth > _WORTH:
-                out[:, s], learned[s] = values[:, s] - line, True
+                out[:, s] = values[:, s] - line
             if worth > max(_WORTH, worths[stream.joint - 1]):
                 worths[stream.joint - 1] = worth
                 warmth[:, stream.joint - 1] = _centred(x, healthy)
-    return Adjusted(out, known, learned, warmth)
+    return Adjusted(out, known, warmth)
 
 
 def _centred(x: Array, healthy: int) -> Array:

@@ -21,7 +21,6 @@ from armloop.experiment.design import (
     optimise,
     random_references,
     sampled,
-    told_apart,
 )
 from armloop.experiment.design.optimise import Objective
 from armloop.experiment.excitation import MotionRanges
@@ -134,7 +133,7 @@ def test_a_motion_that_tells_two_effects_apart() -> None:
 
     typical = [sampled(reference, 0.05) for reference in random_references(limits, 10.0, 8, 0)]
     regression = Regression.of(columns, ["spring", "gravity", "1", "v"], np.ones(1), typical, required=(0, 1))
-    problem = Problem(Series(3, 4, 10.0), regression, told_apart(1, 1), limits)
+    problem = Problem(Series(3, 4, 10.0), regression, CRITERIA["logdet"], limits)
     design = problem.optimise(2, 0)
     assert design is not None
     assert design.value > max(problem.value(reference) for reference in random_references(limits, 10.0, 8, 0))

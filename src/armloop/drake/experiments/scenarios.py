@@ -202,7 +202,7 @@ def load_tracking(
         tuple(data.controllers),
         data.random_seed,
         data.bandwidth,
-        _pickup(data.pickup, plant.arm, reference, where),
+        _pickup(data.pickup, reference, where),
         data.wear,
         rate,
         used,
@@ -236,7 +236,7 @@ def _effects(data: list[PlantEffectData], arm: Arm, where: str) -> tuple[Undecla
     return effects
 
 
-def _pickup(data: PickupData | None, arm: Arm, reference: Reference, where: str) -> Pickup | None:
+def _pickup(data: PickupData | None, reference: Reference, where: str) -> Pickup | None:
     if data is None:
         return None
     if not 0 < data.at <= data.diagnose_at - _LEAST_LOG or not data.diagnose_at < reference.duration:

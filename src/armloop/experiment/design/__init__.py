@@ -1,10 +1,10 @@
 """Experiment design: references that determine the coefficients of a later regression as well as the arm allows.
 
 The columns whose information is made large are handed in as a function of the motion, so that a library, or two
-competing effects that a run should tell apart (`criteria.told_apart`, `criteria.unexplained`), are designed for alike.
+competing effects that a run should tell apart (`criteria.unexplained`), are designed for alike.
 """
 
-from armloop.experiment.design.criteria import CRITERIA, Criterion, condition_number, told_apart, unexplained
+from armloop.experiment.design.criteria import CRITERIA, Criterion, condition_number, unexplained
 from armloop.experiment.design.data_ratio import DataRatio, amount_needed, data_ratio
 from armloop.experiment.design.excite import Excitation, Measure, excite, measured
 from armloop.experiment.design.information import Columns, Regression
@@ -40,6 +40,5 @@ __all__ = [
     "nominal_torque",
     "random_references",
     "sampled",
-    "told_apart",
     "unexplained",
 ]

@@ -57,24 +57,6 @@ def smooth_condition(F: Array) -> tuple[float, Array]:
     return -most, _with(vectors, -spread)
 
 
-def told_apart(first: int, second: int) -> Criterion:
-    """How well two competing sets of columns are told apart, whatever else is regressed with them.
-
-    F is that of [first columns, second columns, others]. The measure is the mean log information on the first
-    two sets together once the others are free (their Schur complement): it falls to the floor where one set
-    can stand for the other, and grows with the size of what either leaves unexplained by the other.
-    """
-    both = first + second
-
-    def measure(F: Array) -> tuple[float, Array]:
-        whole, rest = _log_volume(F), _log_volume(F[both:, both:])
-        gradient = whole[1].copy()
-        gradient[both:, both:] -= rest[1]
-        return (whole[0] - rest[0]) / both, gradient / both
-
-    return measure
-
-
 def unexplained(confounded: Sequence[tuple[int, Sequence[int]]], enough: float) -> Criterion:
     """How much of a torque its rivals cannot stand for, the worst of several torques first.
 
@@ -120,13 +102,6 @@ def condition_number(F: Array) -> float:
     """Condition number of the weighted, scaled regression: the root of that of F."""
     values = np.linalg.eigvalsh(F)
     return float(np.sqrt(values[-1] / values[0])) if values[0] > ROUND_OFF * values[-1] else np.inf
-
-
-def _log_volume(F: Array) -> tuple[float, Array]:
-    if len(F) == 0:
-        return 0.0, F
-    value, gradient = log_determinant(F)
-    return len(F) * value, len(F) * gradient
 
 
 def _eigen(F: Array) -> tuple[Array, Array]:

@@ -132,7 +132,7 @@ def excite(
     """
     timing = settings.timing(arm.n)
     limits = Limits(ranges, (1 - settings.reserve) * arm.effort, torque or nominal_torque(arm))
-    notes = _effort_notes(arm, limits.torque)
+    notes = _effort_notes(arm)
     check_rest(arm, limits)
     progress(f"{settings.random} random references of {timing.period:g} s within the limits")
     drawn = random_references(limits, timing.period, settings.random, settings.seed)
@@ -208,7 +208,7 @@ def _noise(arm: Arm, limits: Limits, settings: Settings, typical: list[Motion]) 
     return np.asarray(_NOISE * np.where(np.isfinite(arm.effort), arm.effort, rms))
 
 
-def _effort_notes(arm: Arm, torque: TorqueLaw) -> list[str]:
+def _effort_notes(arm: Arm) -> list[str]:
     notes = []
     unlimited = [joint.name for joint in arm.joints if not np.isfinite(joint.effort)]
     if unlimited:
