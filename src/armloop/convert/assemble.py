@@ -8,12 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
 from armloop.convert.clocks import DAY, through_midnight
 from armloop.convert.joints import doubtful_order, match
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
-from armloop.convert.recording import Array, Recording, some
+from armloop.convert.recording import Recording, some
 from armloop.convert.units import CURRENTS, FACTORS, RATES, canonical, time_unit
 from armloop.convert.wraps import unwrapped
 from armloop.data.header import JOINT_COLUMN
@@ -21,6 +20,7 @@ from armloop.data.log import FEWEST_SAMPLES, GAP_PERIODS, MotionLog, unchecked_l
 from armloop.data.plausibility import LARGEST_Q
 from armloop.data.rate_noise import central_differences
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import LogError
 
 # A run that follows another starts so many sample periods later: clearly a gap.
@@ -362,7 +362,7 @@ def _cells(recording: Recording, name: str, needed: str, correct: str) -> Array:
     return cells
 
 
-def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.intp], list[int]]:
+def _time(recording: Recording, mapping: Mapping) -> tuple[Array, Index, list[int]]:
     """Seconds from the first sample, the rows that are kept, and where parts of the source start among them."""
     N = recording.samples
     if mapping.time.rate is not None:

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.convert.joints import match
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
-from armloop.convert.recording import Array, Recording
+from armloop.convert.recording import Recording
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import LogError
 
 JOINT_STATE = "JointState"
@@ -116,7 +116,7 @@ def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> 
     return _recording(path, clock[kept], [rows[int(k)] for k in kept], names, starts, notes)
 
 
-def _in_turn(clock: Any, received: Any, notes: list[str]) -> tuple[NDArray[np.intp], list[int]]:
+def _in_turn(clock: Any, received: Any, notes: list[str]) -> tuple[Index, list[int]]:
     """Messages in the order of their stamps, and where a clock that was set back begins anew among them.
 
     One that is late comes later than its stamp says; behind a clock that was set back all do.

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.experiment.excitation import MotionRanges
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.arrays import Array
 
 CONDITIONS = ("static", "constant_velocity", "varying")
 
@@ -47,6 +47,6 @@ def inverse_dynamics_samples(
     return logs
 
 
-def _noisy(x: NDArray[np.float64], snr: float, rng: np.random.Generator) -> NDArray[np.float64]:
+def _noisy(x: Array, snr: float, rng: np.random.Generator) -> Array:
     power = np.mean(x**2, axis=0)
     return x + rng.standard_normal(x.shape) * np.sqrt(power * 10.0 ** (-snr / 10.0))

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.finite import finite
 
 _MOST = 400
@@ -61,7 +60,7 @@ def rms_of(tau: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(tau**2, axis=0)))
 
 
-def states_of(motion: Motion, moving: NDArray[np.bool_]) -> Motion:
+def states_of(motion: Motion, moving: Mask) -> Motion:
     """At most 400 states of a log in which every joint slides, evenly over it.
 
     At rest dry friction is not determined, so that nothing could be compared. Where all joints never slide at once,

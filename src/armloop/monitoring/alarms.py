@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.monitoring.ranks import scan, threshold
 from armloop.monitoring.units import Stream
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 #: Units looked at together; a longer history is looked at in stretches that overlap by half.
 LONGEST = 512
@@ -80,7 +79,7 @@ class Watched:
 
 def find_alarms(
     values: Array,
-    programme: NDArray[np.intp],
+    programme: Index,
     tolerance: Array,
     listed: Sequence[Stream],
     mean_units: float | Array,

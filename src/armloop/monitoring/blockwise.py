@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion, Samples
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue
 from armloop.monitoring.naming import Normal, name_change
 from armloop.monitoring.sums import joint_sums, residual_scale
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 #: What a cumulative sum lets pass per block, and where it alarms, in units of the largest healthy score: a lasting
 #: score half as large again as everything healthy alarms after a dozen blocks, one four times as large after one.
@@ -84,7 +83,7 @@ class Watch:
 
 
 def block_sums(
-    model: ReconstructedModel, motion: Motion, tau: Array, slides: NDArray[np.bool_]
+    model: ReconstructedModel, motion: Motion, tau: Array, slides: Mask
 ) -> tuple[tuple[Column, ...], BlockSums]:
     """Sums of one block of samples.
 

@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.laws.effects import Effect, effect, hypotheses
 from armloop.laws.effects.base import Context, Place
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index, Mask
 
 #: An effect with more values of its nonlinear parameter than this is a spectrum (a ripple's order), of which no few
 #: columns say anything; the energy of the residual shows it, and the diagnosis of the logs themselves names it.
@@ -67,7 +66,7 @@ class Column:
         """The effect itself."""
         return effect(self.name, self.joint, self.other_joint)
 
-    def concerns(self, joints: int) -> NDArray[np.bool_]:
+    def concerns(self, joints: int) -> Mask:
         """(n,) joints whose torque the parameter is measured against."""
         if self.joint is None:
             return np.ones(joints, dtype=bool)
@@ -120,7 +119,7 @@ def known_context(model: ReconstructedModel, samples: Samples) -> Context:
 
 
 def catalogue(
-    model: ReconstructedModel, samples: Samples, rows: NDArray[np.intp], whole: Context | None = None
+    model: ReconstructedModel, samples: Samples, rows: Index, whole: Context | None = None
 ) -> Catalogue:
     """The columns of a run's samples ``rows`` (K,), in the order of :func:`watched`.
 
@@ -151,7 +150,7 @@ def catalogue(
     return Catalogue(tuple(columns), np.concatenate(parts, axis=2), whole.predicted)
 
 
-def motion_of(samples: Samples, rows: NDArray[np.intp]) -> Motion:
+def motion_of(samples: Samples, rows: Index) -> Motion:
     """The motion at some samples, in the runs that they lie in."""
     motion = samples.motion
     run = np.searchsorted(motion.starts, rows, side="right")
@@ -168,7 +167,7 @@ class Catalogue:
     predicted: Array
 
 
-def groups(columns: Sequence[Column]) -> dict[Place, NDArray[np.intp]]:
+def groups(columns: Sequence[Column]) -> dict[Place, Index]:
     """Indices of the columns of each effect at each place."""
     found: dict[Place, list[int]] = {}
     for index, column in enumerate(columns):

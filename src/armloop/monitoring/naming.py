@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.laws.effects import Effect, Estimate
 from armloop.laws.effects.base import Place, entry
@@ -15,7 +14,7 @@ from armloop.monitoring.catalogue import Column, groups, stays_nonlinear
 from armloop.regression.embedded import Linear, ridge, solve
 from armloop.regression.moments import Moments
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 #: Ridges tried of what the model leaves on healthy units: where it is no more than noise, or the motion goes on to others,
 #: its weak directions would put more into the window than they take out.
@@ -186,13 +185,13 @@ def _derivative(columns: Sequence[Column], full: Normal, chosen: Sequence[Place]
     return e.embed(x[list(chosen).index(place)])[1]
 
 
-def _shows(rest: Normal, index: NDArray[np.intp]) -> bool:
+def _shows(rest: Normal, index: Index) -> bool:
     """Whether columns are more than rounding errors (what an encoder of a vertical axis would do to the weight)."""
     size = np.einsum("upp->p", rest.gram)
     return bool((size[index] > _NOTHING * size.max(initial=0.0)).any())
 
 
-def _left_out(rest: Normal, index: NDArray[np.intp]) -> tuple[Normal, Array]:
+def _left_out(rest: Normal, index: Index) -> tuple[Normal, Array]:
     """The problem of some columns, and (U, k) its coefficients with each unit left out (with it where it is alone)."""
     G, b = rest.gram[:, index[:, None], index[None, :]], rest.moment[:, index]
     G_all, b_all = G.sum(axis=0), b.sum(axis=0)
@@ -200,7 +199,7 @@ def _left_out(rest: Normal, index: NDArray[np.intp]) -> tuple[Normal, Array]:
     return Normal(G, b, rest.energy), np.array(beta)
 
 
-def _held_out(rest: Normal, index: NDArray[np.intp]) -> Array:
+def _held_out(rest: Normal, index: Index) -> Array:
     """(U,) energy that columns explain on each unit, fitted on all others (on itself if it is alone)."""
     own, beta = _left_out(rest, index)
     return np.einsum("up,up->u", beta, 2 * own.moment - np.einsum("upq,uq->up", own.gram, beta))

@@ -23,7 +23,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index, Mask
 
 #: Fewest units of a programme that are a reference.
 FEWEST = 5
@@ -43,10 +43,10 @@ class Scan:
     """
 
     log_evidence: Array
-    since: NDArray[np.intp]
+    since: Index
 
 
-def scan(values: Array, programme: NDArray[np.intp], tolerance: Array, first: int = 0) -> Scan:
+def scan(values: Array, programme: Index, tolerance: Array, first: int = 0) -> Scan:
     """Run the e-detectors over units in their order.
 
     Args:
@@ -65,9 +65,7 @@ def scan(values: Array, programme: NDArray[np.intp], tolerance: Array, first: in
     return Scan(evidence, since)
 
 
-def _one_side(
-    y: Array, programme: NDArray[np.intp], tolerance: Array, first: int
-) -> tuple[Array, NDArray[np.intp]]:
+def _one_side(y: Array, programme: Index, tolerance: Array, first: int) -> tuple[Array, Index]:
     n, S = y.shape
     y = np.ascontiguousarray(y.T)
     there = np.isfinite(y)
@@ -120,8 +118,8 @@ class _Likelihood:
         self,
         below: NDArray[np.int32],
         size: NDArray[np.int32],
-        programme: NDArray[np.intp],
-        counted: NDArray[np.bool_],
+        programme: Index,
+        counted: Mask,
     ) -> Array:
         """(K, S, m) likelihood ratio of each of the m units after the candidate change; 1 where it does not count."""
         # how many earlier units of the programme lie in the same gap, and how many there are at all
@@ -140,7 +138,7 @@ class _Likelihood:
         return np.asarray(odds)
 
 
-def _earlier_equals(codes: NDArray[np.intp], largest: int) -> NDArray[np.intp]:
+def _earlier_equals(codes: Index, largest: int) -> Index:
     """(S, m) how many entries before each one in its row are equal to it; codes from 0 to ``largest``."""
     if largest < 2**16:
         codes = codes.astype(np.uint16)  # sorted by radix

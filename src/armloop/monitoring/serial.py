@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 #: Of fewer units the order of a programme says nothing: two are always neighbours.
 _FEWEST = 3
 
 
-def serial_correlation(values: Array, programme: NDArray[np.intp]) -> tuple[Array, int]:
+def serial_correlation(values: Array, programme: Index) -> tuple[Array, int]:
     """Rank correlation of each unit with the next one of its programme, pooled over programmes.
 
     Ranks are those within the programme, since programmes differ in level: ranked together, a block of one and then of

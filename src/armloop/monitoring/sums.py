@@ -11,7 +11,6 @@ from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.log import MotionLog
@@ -19,7 +18,7 @@ from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, preprocess, smooth
 from armloop.model import ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue, known_context
-from armloop.util.arrays import Array, filled
+from armloop.util.arrays import Array, Index, Mask, filled
 from armloop.util.errors import LogError
 
 #: Longest block, s.
@@ -173,7 +172,7 @@ def log_sums(
     )
 
 
-def _pieces(edges: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+def _pieces(edges: Index) -> Iterator[Index]:
     """The edges of blocks (B + 1,), as many blocks at a time as have no more than :data:`_PIECE` samples, at least one."""
     at = 0
     while at < len(edges) - 1:
@@ -182,7 +181,7 @@ def _pieces(edges: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
         at = end
 
 
-def joint_sums(x: Array, u: Array, slides: NDArray[np.bool_]) -> tuple[Array, Array]:
+def joint_sums(x: Array, u: Array, slides: Mask) -> tuple[Array, Array]:
     """Σ x xᵀ (p, p) and Σ x u (p,) of columns x (N, n, p) and residual u (N, n), over the samples that count."""
     p = x.shape[2]
     gram, moment = np.zeros((p, p)), np.zeros(p)

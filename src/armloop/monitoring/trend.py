@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index
 from armloop.util.finite import finite
 
 _DAY = 86400.0
@@ -41,7 +40,7 @@ class Course:
         return {"form": self.form, "size": self.size, "per_day": drift, "margin": self.margin}
 
 
-def course(when: Array, values: Array, programme: NDArray[np.intp] | None = None) -> Course:
+def course(when: Array, values: Array, programme: Index | None = None) -> Course:
     """Compare a step and a ramp, each with the begin that suits it best.
 
     Args:
@@ -67,7 +66,7 @@ def course(when: Array, values: Array, programme: NDArray[np.intp] | None = None
     return Course(form, int(there[steps[step[2]]]), step[1], float("nan"), abs(gap))
 
 
-def _best(shapes: Array, y: Array, level: NDArray[np.intp]) -> tuple[float, float, int]:
+def _best(shapes: Array, y: Array, level: Index) -> tuple[float, float, int]:
     """Least squares of y (U,) on each of K shapes (K, U) beside the levels: error², coefficient and index of the best."""
     x, rest = _within(shapes, level), _within(y[None], level)[0]
     size, along = (x**2).sum(axis=1), x @ rest
@@ -79,7 +78,7 @@ def _best(shapes: Array, y: Array, level: NDArray[np.intp]) -> tuple[float, floa
     return float(left[best]), float(beta[best]), best
 
 
-def _within(x: Array, level: NDArray[np.intp]) -> Array:
+def _within(x: Array, level: Index) -> Array:
     """Rows (K, U) less their mean over the units of each level."""
     same = level[:, None] == level
     return np.asarray(x - x @ (same / same.sum(axis=0)))

@@ -11,13 +11,12 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
 from armloop.laws.effects.base import Place
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.ranks import HORIZON
 from armloop.monitoring.sums import FEWEST_ROWS
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 #: A longer log is several units, s.
 UNIT_SECONDS = 600.0
@@ -46,8 +45,8 @@ class Units:
     columns: tuple[Column, ...]
     when: Array
     seconds: Array
-    programme: NDArray[np.intp]
-    log: NDArray[np.intp]
+    programme: Index
+    log: Index
     moment: Array
     size: Array
     rows: Array
@@ -61,7 +60,7 @@ class Units:
         """The number of units U."""
         return len(self.when)
 
-    def take(self, index: NDArray[np.intp] | slice) -> Units:
+    def take(self, index: Index | slice) -> Units:
         """Some of the units."""
         _, *arrays = fields(self)
         return Units(self.columns, *(getattr(self, each.name)[index] for each in arrays))

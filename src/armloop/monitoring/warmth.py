@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.laws.effects import REGISTRY
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Normal
 from armloop.monitoring.units import ENERGY, Stream, Units
 from armloop.regression.embedded import ridge
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 #: What a change of friction leaks into.
 _LEAKS = frozenset({"rotor_inertia", "torque_gain", ENERGY})
@@ -128,7 +127,7 @@ def without_warmth(
     )
 
 
-def _line(x: Array, y: Array, programme: NDArray[np.intp], healthy: int) -> tuple[float, Array] | None:
+def _line(x: Array, y: Array, programme: Index, healthy: int) -> tuple[float, Array] | None:
     """Variance explained on left-out healthy units, and what a line in x explains of all units' y (U,)."""
     train = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & (np.arange(len(x)) < healthy))
     if len(train) < _FEWEST or np.ptp(x[train]) <= 1e-9 * max(1.0, float(np.abs(x[train]).max())):
@@ -149,7 +148,7 @@ def _line(x: Array, y: Array, programme: NDArray[np.intp], healthy: int) -> tupl
     return worth, np.where(np.isfinite(inside), slope * inside, 0.0)
 
 
-def _levels(values: Array, programme: NDArray[np.intp], train: NDArray[np.intp]) -> Array:
+def _levels(values: Array, programme: Index, train: Index) -> Array:
     """(U,) mean of the healthy units of each unit's programme; of all of them where it has none."""
     level = np.full(len(values), float(values[train].mean()))
     for one in np.unique(programme[train]).tolist():

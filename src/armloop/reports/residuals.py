@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.data.signals import independent_rows
 from armloop.diagnosis import Diagnosis
 from armloop.diagnosis.fit import Fit
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 #: Runs laid end to end are this far apart, as a part of all of them.
 _GAP = 0.02
@@ -29,7 +28,7 @@ class Residuals:
             stands still or something pushed the arm.
     """
 
-    rows: NDArray[np.intp]
+    rows: Index
     before: Array
     after: Array
 

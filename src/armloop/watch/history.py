@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Normal
 from armloop.monitoring.units import Units, unit_edges
+from armloop.util.arrays import Index
 from armloop.util.errors import InputError
 from armloop.watch.store import PER_BLOCK, PER_JOINT, digests, matrix, read_table
 
@@ -67,7 +67,7 @@ class History:
 
     logs: tuple[Head, ...]
     units: Units
-    pieces: NDArray[np.intp]
+    pieces: Index
 
     @staticmethod
     def read(heads: Sequence[Head], columns: tuple[Column, ...]) -> History:
@@ -114,7 +114,7 @@ class History:
         units = Units(columns=self.units.columns, **joined)
         return _tidy((*self.logs, *later.logs), units, np.concatenate([self.pieces, later.pieces]))
 
-    def take(self, index: NDArray[np.intp]) -> History:
+    def take(self, index: Index) -> History:
         """Some of the units, in order."""
         return _tidy(self.logs, self.units.take(index), self.pieces[index])
 
@@ -154,7 +154,7 @@ def programme_numbers(heads: Sequence[Head]) -> dict[str, int]:
     return {name: k for k, name in enumerate(sorted({head.programme for head in heads}))}
 
 
-def _tidy(logs: tuple[Head, ...], units: Units, pieces: NDArray[np.intp]) -> History:
+def _tidy(logs: tuple[Head, ...], units: Units, pieces: Index) -> History:
     """A history without logs that no unit is of, its programmes numbered anew."""
     used, log = np.unique(units.log, return_inverse=True)
     kept = tuple(logs[k] for k in used.tolist())

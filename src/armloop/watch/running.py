@@ -14,12 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.monitoring.alarms import Alarm, Reached
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.units import Units
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 from armloop.util.finite import finite
 from armloop.watch.history import Head, History, programme_numbers
 from armloop.watch.store import Store, matrix, read_table, write_table
@@ -67,7 +66,7 @@ class Running:
     count: int = 0
     seconds: float = 0.0
     history: History | None = None
-    numbers: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    numbers: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     reached: Reached = field(default_factory=Reached)
     most: Array | None = None
     alarms: tuple[str, ...] = ()

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.laws.effects.base import Place
 from armloop.model import ReconstructedModel
@@ -22,7 +21,7 @@ from armloop.monitoring.serial import serial_correlation
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
 from armloop.monitoring.warmth import Adjusted, adjust, warms, without_warmth
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 from armloop.util.finite import finite
 from armloop.watch.attainable import attainable
 from armloop.watch.diagnosed import diagnose_alarms
@@ -141,7 +140,7 @@ def examine(history: History, hours: float, healthy: int, past: Running | None =
     )
 
 
-def _notes(values: Array, programme: NDArray[np.intp]) -> tuple[str, ...]:
+def _notes(values: Array, programme: Index) -> tuple[str, ...]:
     """What a reader must know of the promise's premise: whether healthy units follow each other like strangers."""
     correlations, count = serial_correlation(values, programme)
     known = correlations[np.isfinite(correlations)]

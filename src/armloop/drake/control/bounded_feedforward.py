@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armloop.drake.control.bounded_program import Program
 from armloop.drake.control.reference import ReferenceLike, as_reference
@@ -23,7 +23,7 @@ from armloop.drake.given import require_joints, require_model
 from armloop.dynamics import ModelEquations
 from armloop.experiment.excitation import Reference, TableReference
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import InputError
 from armloop.util.functions import NUMPY
 from armloop.util.given import require, shown
@@ -178,9 +178,7 @@ def _derivatives(equations: ModelEquations, q: Array, v: Array, vdot: Array) -> 
     return _torque(equations, q, v, vdot), J
 
 
-def _dry_friction(
-    equations: ModelEquations, q: Array, v: Array, vdot: Array
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _dry_friction(equations: ModelEquations, q: Array, v: Array, vdot: Array) -> tuple[Array, Array, Mask]:
     """Return the dry friction (K, n), its level, and where the sliding is too slow to tell its sign."""
     dry, level, slow = np.zeros_like(v), np.zeros_like(v), np.zeros(v.shape, dtype=bool)
     columns = [list(x.T) for x in (q, v, vdot)]

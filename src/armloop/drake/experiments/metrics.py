@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index, Mask
 
 STILL = 1e-4
 """A joint slower than this rests, rad/s (m/s); sticking joints of the simulation creep 1e-7 at most."""
@@ -53,7 +52,7 @@ def measure(period: float, error: Array, v: Array, v_ref: Array, tau: Array, ask
     )
 
 
-def reversals(v_ref: Array) -> NDArray[np.intp]:
+def reversals(v_ref: Array) -> Index:
     """Return the samples at which a reference (N,) has just ended one direction and goes on to the other.
 
     It may rest in between.
@@ -63,7 +62,7 @@ def reversals(v_ref: Array) -> NDArray[np.intp]:
     return np.asarray(moving[turns] + 1)
 
 
-def _settling(outside: NDArray[np.bool_], v_ref: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+def _settling(outside: Mask, v_ref: Array) -> tuple[Index, Mask]:
     """Return per reversal the steps until the error stays inside, and whether it never did before the next."""
     starts = reversals(v_ref)
     # 0 stands for none: no reversal is as early

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armloop.laws.friction import stribeck_fall
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.functions import NUMPY, Functions
 from armloop.util.given import require
@@ -45,11 +46,11 @@ class JointFriction:
             v, self.stribeck_velocity, functions
         )
 
-    def dry(self, v: ArrayLike) -> NDArray[np.float64]:
+    def dry(self, v: ArrayLike) -> Array:
         """Return the part with sign(v) at `v` (any shape); 0 at rest, where it is not determined."""
         v = np.asarray(v, dtype=float)
         return np.asarray(self.level(v) * np.sign(v))
 
-    def force(self, v: ArrayLike) -> NDArray[np.float64]:
+    def force(self, v: ArrayLike) -> Array:
         """Return f(v), what the drive must supply to keep sliding at `v` (any shape)."""
         return self.dry(v) + self.viscous * np.asarray(v, dtype=float)

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import MeshcatVisualizer
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from armloop.drake.view.scene import COLOURS, add_actors, local_meshcat, look_at
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.files import write_text
 
 _LEGEND = (
@@ -27,11 +27,11 @@ class Recorded(Protocol):
     """Samples of a run: time (N,) in s, positions and the reference's positions (N, n)."""
 
     @property
-    def time(self) -> NDArray[np.float64]: ...
+    def time(self) -> Array: ...
     @property
-    def q(self) -> NDArray[np.float64]: ...
+    def q(self) -> Array: ...
     @property
-    def q_ref(self) -> NDArray[np.float64]: ...
+    def q_ref(self) -> Array: ...
 
 
 def write_replay(

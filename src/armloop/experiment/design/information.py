@@ -12,11 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from armloop.data.motion import Motion
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 Columns = Callable[[Motion], Array]
 """The columns (N, m, p) of a motion's regression: p coefficients shared by m rows a sample (one per joint, or one in
@@ -43,7 +42,7 @@ class Regression:
     columns: Columns
     names: tuple[str, ...]
     noise: Array
-    kept: NDArray[np.intp]
+    kept: Index
     size: Array
 
     @staticmethod

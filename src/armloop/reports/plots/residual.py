@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, StrMethodFormatter
-from numpy.typing import NDArray
 from scipy.signal import welch
 
 from armloop.diagnosis import Diagnosis
@@ -27,7 +26,7 @@ from armloop.reports.plots.style import (
 )
 from armloop.reports.residuals import held_out_residuals, joint_load, longest_run, moving_joints, time_axis
 from armloop.reports.words import unit
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 Series = list[tuple[Array, str, str]]
 
@@ -104,7 +103,7 @@ def residual_shape_figure(diagnosis: Diagnosis, what_is_left: bool = False) -> F
     return made
 
 
-def _series(diagnosis: Diagnosis) -> tuple[NDArray[np.intp], Series]:
+def _series(diagnosis: Diagnosis) -> tuple[Index, Series]:
     """Samples shown, and residuals there with colour and label; one residual where no effect was found."""
     shown = held_out_residuals(diagnosis)
     if not diagnosis.outcome.found:
@@ -146,7 +145,7 @@ def _cloud(axes: Axes, x: Array, y: Array, color: str, label: str) -> None:
     axes.plot(0.5 * (edges[1:] + edges[:-1])[enough], mean[enough], color=color, linewidth=2, label=label)
 
 
-def _spectra(axes: Axes, diagnosis: Diagnosis, rows: NDArray[np.intp], series: Series, j: int) -> None:
+def _spectra(axes: Axes, diagnosis: Diagnosis, rows: Index, series: Series, j: int) -> None:
     """Amplitude density of the longest run; the samples at standstill count as zero."""
     samples, scale = diagnosis.samples, float(diagnosis.evidence.scale[j])
     run = longest_run(samples.motion)
