@@ -96,6 +96,7 @@ class Answers:
             "strongest_first": lambda evidence, outcome: self.note("ordered", evidence.name, outcome),
             "without_laws": lambda evidence, laws: evidence,
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
+            "of_the_day": lambda whole: None,
         }
         parts["of_the_temperature"] = lambda model, added: self.given.get("of_the_temperature", [])
         parts["of_too_few_logs"] = lambda model, found: self.given.get("of_too_few_logs", [])

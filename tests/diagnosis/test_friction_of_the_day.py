@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
@@ -148,12 +149,46 @@ def test_friction_that_logs_do_not_tell_or_that_is_small_is_no_matter(model: Rec
         ([("payload", None)], [("payload", None)], True),
         ([("payload", None)], [("payload", None), ("viscous_friction", 1)], False),
         ([("payload", None)], [], True),
+        ([("external_contact", None)], [], True),
+        ([("external_contact", None)], [("external_contact", None)], False),
     ],
 )
 def test_what_names_less_is_not_taken(beside: Any, plain: Any, taken: bool) -> None:
     other: Any = SimpleNamespace(named=plain)
-    found: Any = SimpleNamespace(verdict="effects_found", laws=[], named=beside)
+    laws = [name for name, _ in beside if name != "external_contact"]
+    outcome = SimpleNamespace(found=laws)
+    found: Any = SimpleNamespace(verdict="effects_found", laws=[], named=beside, outcome=outcome)
     assert says_more(found, other) is taken
-    for verdict, laws in (("no_effect", []), ("effects_found", ["a law"])):
-        nothing: Any = SimpleNamespace(verdict=verdict, laws=laws, named=beside)
+    for verdict, unlisted in (("no_effect", []), ("effects_found", ["a law"])):
+        nothing: Any = SimpleNamespace(verdict=verdict, laws=unlisted, named=beside, outcome=outcome)
         assert not says_more(nothing, other)
+
+
+@pytest.mark.parametrize("rubs", [False, True])
+@pytest.mark.parametrize("more", [False, True])
+def test_friction_is_taken_off_anew_beside_friction_that_was_found(
+    rubs: bool, more: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module, asked = import_module("armloop.diagnosis.diagnose"), list[Any]()
+    added = [SimpleNamespace(effect=SimpleNamespace(rubs=rubs))]
+    outcome = SimpleNamespace(added=lambda: added)
+
+    def of_the_day(whole: Any, known: Any = ()) -> Any:
+        asked.append(list(known))
+        return f"day {len(asked)}", f"friction {len(asked)}"
+
+    def verdict(whole: Any, logs: Any, progress: Any, jobs: Any) -> Any:
+        return SimpleNamespace(of=whole, outcome=outcome), f"account of {whole}"
+
+    monkeypatch.setattr(module, "preprocess", lambda logs, how: None)
+    monkeypatch.setattr(module, "hypotheses", lambda arm: [])
+    monkeypatch.setattr(module.Evidence, "of", lambda *_: "whole")
+    monkeypatch.setattr(module, "of_the_day", of_the_day)
+    monkeypatch.setattr(module, "_verdict", verdict)
+    monkeypatch.setattr(module, "says_more", lambda found, other: more and other.of == "whole")
+    monkeypatch.setattr(module, "of_that_day", lambda model, found, friction: (found.of, friction))
+    model: Any = SimpleNamespace(conditioning=None, arm=None)
+    found, account = module._judged(model, [], print, 1)
+    assert asked == ([[], added] if rubs else [[]]) and account == "account of whole"
+    last = len(asked)
+    assert (found == (f"day {last}", f"friction {last}")) if more else found.of == "whole"

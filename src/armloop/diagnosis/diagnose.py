@@ -170,7 +170,7 @@ def _verdict(
     if too_still(evidence):
         return replace(_by_events_alone(whole, contacts, untold), logs=names), None
     blocks = len(np.unique(evidence.blocks))
-    progress(f"searching {len(whole.asked)} hypotheses on {blocks} blocks")
+    progress(f"searching {len(hypotheses(whole.model.arm))} hypotheses on {blocks} blocks")
     with Hypotheses(whole, jobs) as panel:
         account = best_account(whole, contacts, progress, panel)
     account = account_with_load(whole, account, progress, jobs, logs) or account

@@ -87,13 +87,13 @@ def of_that_day(model: ReconstructedModel, found: Diagnosis, friction: Sequence[
 def says_more(found: Diagnosis, other: Diagnosis) -> bool:
     """Whether a verdict beside the friction of the day is taken in the place of the other.
 
-    It must name something and no more than what is listed. What friction hid is then told, or told better; but friction that
-    is more than what differs is named by the other alone.
+    It must name something, and no more than what is listed. What friction hid is then told, or told better; but friction
+    that is more than what differs is named by the other alone, and an event is none of friction's: it is told as it was.
     """
     if found.verdict != "effects_found" or found.laws:
         return False
     mine, others = set(found.named), set(other.named)
-    return bool(mine - others) or mine == others
+    return bool(mine - others) or (mine == others and bool(found.outcome.found))
 
 
 _KINDS = ("coulomb_friction", "viscous_friction")
