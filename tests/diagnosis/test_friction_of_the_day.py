@@ -141,27 +141,33 @@ def test_friction_that_logs_do_not_tell_or_that_is_small_is_no_matter(model: Rec
     )
 
 
+def told(laws: list[str], events: int = 0, verdict: str = "effects_found", unlisted: int = 0) -> Any:
+    found = [SimpleNamespace(effect=SimpleNamespace(place=name)) for name in laws]
+    outcome = SimpleNamespace(found=found)
+    return SimpleNamespace(
+        verdict=verdict, laws=["a law"] * unlisted, outcome=outcome, contacts=["push"] * events
+    )
+
+
 @pytest.mark.parametrize(
     ("beside", "plain", "taken"),
     [
-        ([("payload", None), ("coulomb_friction", 2)], [("payload", None)], True),
-        ([("elastic_cable", None)], [("coupling_spring", 2)], True),
-        ([("payload", None)], [("payload", None)], True),
-        ([("payload", None)], [("payload", None), ("viscous_friction", 1)], False),
-        ([("payload", None)], [], True),
-        ([("external_contact", None)], [], True),
-        ([("external_contact", None)], [("external_contact", None)], False),
+        (told(["payload", "coulomb_friction"]), told(["payload"]), True),
+        (told(["elastic_cable"]), told(["coupling_spring"]), True),
+        (told(["payload"]), told(["payload"]), True),
+        (told(["payload"]), told(["payload", "viscous_friction"]), False),
+        (told(["payload"]), told([]), True),
+        (told([], 1), told([]), True),
+        (told([], 2), told([], 1), False),
+        (told(["payload"], 1), told(["payload"], 1), False),
+        (told(["payload"]), told([], 7), True),
+        (told([], 1), told(["payload"]), True),
+        (told(["payload"], verdict="no_effect"), told([]), False),
+        (told(["payload"], unlisted=1), told([]), False),
     ],
 )
 def test_what_names_less_is_not_taken(beside: Any, plain: Any, taken: bool) -> None:
-    other: Any = SimpleNamespace(named=plain)
-    laws = [name for name, _ in beside if name != "external_contact"]
-    outcome = SimpleNamespace(found=laws)
-    found: Any = SimpleNamespace(verdict="effects_found", laws=[], named=beside, outcome=outcome)
-    assert says_more(found, other) is taken
-    for verdict, unlisted in (("no_effect", []), ("effects_found", ["a law"])):
-        nothing: Any = SimpleNamespace(verdict=verdict, laws=unlisted, named=beside, outcome=outcome)
-        assert not says_more(nothing, other)
+    assert says_more(beside, plain) is taken
 
 
 @pytest.mark.parametrize("rubs", [False, True])

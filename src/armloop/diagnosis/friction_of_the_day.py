@@ -88,12 +88,14 @@ def says_more(found: Diagnosis, other: Diagnosis) -> bool:
     """Whether a verdict beside the friction of the day is taken in the place of the other.
 
     It must name something, and no more than what is listed. What friction hid is then told, or told better; but friction
-    that is more than what differs is named by the other alone, and an event is none of friction's: it is told as it was.
+    that is more than what differs is named by the other alone, and an event that is seen without is told as it was.
     """
     if found.verdict != "effects_found" or found.laws:
         return False
-    mine, others = set(found.named), set(other.named)
-    return bool(mine - others) or (mine == others and bool(found.outcome.found))
+    mine, others = ({one.effect.place for one in each.outcome.found} for each in (found, other))
+    if mine - others:
+        return True
+    return not other.contacts and (bool(found.contacts) or mine == others)
 
 
 _KINDS = ("coulomb_friction", "viscous_friction")
