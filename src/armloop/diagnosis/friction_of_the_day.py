@@ -93,9 +93,9 @@ def says_more(found: Diagnosis, other: Diagnosis) -> bool:
     if found.verdict != "effects_found" or found.laws:
         return False
     mine, others = ({one.effect.place for one in each.outcome.found} for each in (found, other))
-    if mine - others:
-        return True
-    return not other.contacts and (bool(found.contacts) or mine == others)
+    if mine != others:
+        return bool(mine - others)
+    return not other.contacts and bool(found.contacts or mine)
 
 
 _KINDS = ("coulomb_friction", "viscous_friction")
