@@ -6,6 +6,7 @@ on the training samples (principal components in the metric of the torque); a la
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -64,20 +65,19 @@ def torque_errors(model: ReconstructedModel, samples: Samples, between_logs: boo
     one made by hand.
     """
     kept: Sequence[dict[str, Any]] = model.uncertainty.get("torque", [])
-    # by their names: a file gives a joint's terms back in another order than they were found in
-    known = {tuple(sorted(one["unknowns"])): one for one in kept}
     parts = []
-    for problem in problems(model) if known else []:
-        # files from before a fall's velocity was an unknown tell those of the coefficients
-        every = [[True] * len(problem.unknowns), [unknown.linear for unknown in problem.unknowns]]
-        names = np.array([unknown.name for unknown in problem.unknowns])
-        told = next((which for which in every if tuple(sorted(names[which])) in known), None)
-        if told is None:
+    for problem in problems(model) if kept else []:
+        # by their names: a file gives a joint's terms back in another order than they were found in, and one from before a
+        # fall's velocity or a law's parameters were unknowns tells those of the others
+        names = _numbered([unknown.name for unknown in problem.unknowns])
+        one = max(kept, key=lambda each: len({*names} & {*_numbered(each["unknowns"])}))
+        place = {name: k for k, name in enumerate(_numbered(one["unknowns"]))}
+        told = [k for k, name in enumerate(names) if name in place]
+        if 2 * len(told) <= len(place):
             continue
-        one = known[tuple(sorted(names[told]))]
-        found = _directions(one["directions"])[np.argsort(one["unknowns"], kind="stable")]
+        found = _directions(one["directions"])
         directions = np.zeros((len(names), found.shape[1]))
-        directions[np.flatnonzero(told)[np.argsort(names[told], kind="stable")]] = found
+        directions[told] = found[[place[names[k]] for k in told]]
         torque = np.zeros((*samples.motion.q.shape, directions.shape[1]))
         for design in problem.designs(samples):
             torque[:, design.joint] += design.X @ directions[design.where]
@@ -90,6 +90,16 @@ def torque_errors(model: ReconstructedModel, samples: Samples, between_logs: boo
     if between_logs and (spread := friction_spread(model, samples)).any():
         parts.append(spread)
     return np.concatenate(parts, axis=2) if parts else np.zeros((*samples.motion.q.shape, 0))
+
+
+def _numbered(names: Sequence[str]) -> list[tuple[str, int]]:
+    """Names with how many of the same came before: joints have terms of one name, a constant for example."""
+    seen: Counter[str] = Counter()
+    found = []
+    for name in names:
+        found.append((name, seen[name]))
+        seen[name] += 1
+    return found
 
 
 def _symmetric(x: Array) -> Array:

@@ -161,6 +161,8 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
     }
     for part in parts:
         for unknown, own in zip(part.unknowns, np.eye(len(part.unknowns)), strict=True):
+            if unknown.kind == "effects":
+                continue  # theirs stand beside them
             error, freedom = part.of_sum(own)
             place = table[unknown.kind]
             where = place if unknown.joint is None else place[unknown.joint]

@@ -3,12 +3,14 @@
 Sparse terms belong to one joint each, so there is one problem per joint. Base parameters and terms of the
 energies serve all joints: one problem, in which every joint's samples count by the size of its residual. The
 Stribeck velocity v_s is an unknown too; it enters by its derivative (delta method). Columns pass the filter that
-the torque has passed: friction steps where a joint reverses, and so must its column.
+the torque has passed: friction steps where a joint reverses, and so must its column. Laws that were fitted beside shared
+coefficients, such as a balancer's spring beside the weight that it carries, are unknowns of the same problem, each parameter
+by the derivative of its torque: what one takes of the other is an error of both.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +19,14 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.features.double_feature_set import products
 from armloop.features.rigid_body import BaseParameters, rotor_names
+from armloop.laws.effects.base import number
 from armloop.laws.friction import FrictionTerm, stribeck_term
-from armloop.model import ReconstructedModel
+from armloop.model import AddedEffect, ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody, SparseTerms
 from armloop.util.arrays import Array, Index
 
+#: Part of its error by which a law's parameter is moved for the derivative.
+_STEP = 0.1
 #: Name of the unknown v_s beside the friction terms of a joint.
 STRIBECK_VELOCITY = "v_s"
 
@@ -31,7 +36,7 @@ class Unknown:
     """One coefficient.
 
     Attributes:
-        kind: ``"joints"`` (a sparse term), ``"friction"`` or ``"shared"``.
+        kind: ``"joints"`` (a sparse term), ``"friction"``, ``"shared"`` or ``"effects"`` (a law's parameter's error).
         joint: 0-based; None where all joints share it.
         name: as the model prints it.
         value: the estimate.
@@ -72,7 +77,10 @@ class Problem:
 
 
 def problems(model: ReconstructedModel) -> list[Problem]:
-    """The regressions whose solution the model is; effects that a diagnosis added are left aside."""
+    """The regressions whose solution the model is.
+
+    Effects that a diagnosis added are left aside, and so are all beside terms that joints have of their own.
+    """
     bodies = [component for component in model.components if isinstance(component, RigidBody | Lagrangian)]
     if bodies:
         return [_shared(model, *bodies)]
@@ -122,19 +130,52 @@ def _shared(model: ReconstructedModel, body: RigidBody | Lagrangian) -> Problem:
         own = _friction_unknowns(law, joint)
         wheres.append(np.concatenate([np.arange(r), len(unknowns) + np.arange(len(own))]).astype(np.intp))
         unknowns += own
+    laws = list(_parameters(model))
+    wheres = [np.concatenate([where, len(unknowns) + np.arange(len(laws))]) for where in wheres]
+    unknowns += [
+        Unknown("effects", None, f"{key} of {added.effect.label()}", 0.0, 1) for added, key, _ in laws
+    ]
 
     def designs(samples: Samples) -> list[Design]:
         motion = samples.motion
+        slopes = smooth(samples, _slopes(model, motion, laws)) if laws else np.zeros((*motion.v.shape, 0))
         columns = base.columns(model.arm, motion) if base is not None else body.energy.columns(motion)  # type: ignore[union-attr]
         load = columns @ passing
         columns = smooth(samples, columns)
         found = []
         for joint, law in enumerate(model.friction.terms):
             friction = [smooth(samples, x) for x in _friction_columns(law, motion, joint, load)]
-            found.append(Design(joint, wheres[joint], np.column_stack([columns[:, joint], *friction])))
+            X = np.column_stack([columns[:, joint], *friction, slopes[:, joint]])
+            found.append(Design(joint, wheres[joint], X))
         return found
 
     return Problem(unknowns, True, designs)
+
+
+def _parameters(model: ReconstructedModel) -> Iterator[tuple[AddedEffect, str, float]]:
+    """Laws that the model was fitted with, with the name of each of their numbers that has an error, and that."""
+    for added in model.effects:
+        for key, estimate in added.parameters.items():
+            value, error = estimate.value, estimate.std_error
+            if added.when == "always" and isinstance(value, float) and isinstance(error, float):
+                if np.isfinite(error) and error > 0:
+                    yield added, key, error
+
+
+def _slopes(
+    model: ReconstructedModel, motion: Motion, laws: Sequence[tuple[AddedEffect, str, float]]
+) -> Array:
+    """(N, n, q) derivative of laws' torque by their parameters, by central differences of a part of their errors."""
+    context = model.context(motion, [added.effect for added, *_ in laws])
+    found = []
+    for added, key, error in laws:
+        step = _STEP * error
+        high, low = (
+            added.effect.torque(context, {**added.values, key: number(added.values[key]) + sign * step})
+            for sign in (1, -1)
+        )
+        found.append((high - low) / (2 * step))
+    return np.stack(found, axis=2)
 
 
 def _friction_unknowns(law: Sequence[FrictionTerm], joint: int) -> list[Unknown]:
