@@ -5,11 +5,21 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import norm
 
+from armloop.data.blocks import block_numbers
+from armloop.data.motion import Motion
 from armloop.diagnosis.judgement import MOSTLY, NOTICEABLE
 from armloop.util.arrays import Array, Index, Mask
 
 #: Fewest stretches of a run that tell what is left of it elsewhere.
 _FEWEST = 8
+
+
+def pieces_of(part: Motion, seconds: float) -> Index:
+    """(N,) numbers of an event's pieces, so many s long; of one that is too short for two, its halves.
+
+    The filter ties these, but a blow of a twentieth of a second would have none that it could be judged on.
+    """
+    return block_numbers(part, min(seconds, 0.5 * part.samples * part.period))
 
 
 def event_size(columns: Array, y: Array) -> Array:

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
-from armloop.diagnosis.event_size import event_size, event_size_elsewhere, event_size_error
+from armloop.diagnosis.event_size import event_size, event_size_elsewhere, event_size_error, pieces_of
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import REFINEMENTS
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, NOTICEABLE, enough, leaves_more
@@ -25,7 +24,7 @@ from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3
-#: An event lasts this long at least, s; pieces of it that are as long tell by themselves.
+#: An event is seen this long at least, s; pieces of it that are as long tell by themselves.
 SHORTEST = 0.1
 #: So many joints or fewer feel a force as if it were a torque on any of them.
 FEW = 3
@@ -227,7 +226,7 @@ def _at_a_point(
     force = np.asarray(given["force"].value)
     _, levers = _levers(evidence, residual, weight, burst)
     X = np.concatenate([columns, np.stack([lever @ force for lever in levers], axis=2)], axis=2)
-    pieces = block_numbers(part, SHORTEST)
+    pieces = pieces_of(part, SHORTEST)
     errors = force_and_point_errors(X, y - columns @ force, pieces, _away(evidence))
     assert kind.point is not None
     forces = np.array([force, *(each.added.parameters["force"].value for each, _ in alike)])
@@ -275,7 +274,7 @@ def _trial(
     burst = _best_interval(evidence, residual, weight, burst, kind, shown)
     part, columns, y = _burst(evidence, residual, weight, burst, kind)
     # Every other piece, of those that tell of it, is held out in turn.
-    pieces = block_numbers(part, SHORTEST)
+    pieces = pieces_of(part, SHORTEST)
     telling = np.unique(pieces[columns.any(axis=(1, 2))])
     pieces = np.searchsorted(telling, pieces)
     left = np.array(y)
