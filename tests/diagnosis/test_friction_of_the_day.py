@@ -17,6 +17,7 @@ from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose, friction_of_the_day
 from armloop.diagnosis.evidence import Evidence, Whitening
 from armloop.diagnosis.friction_of_the_day import of_the_day, says_more
+from armloop.diagnosis.zeros import predicted
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.laws.effects import hypotheses
 from armloop.model import ReconstructedModel
@@ -124,9 +125,9 @@ def test_friction_of_the_day_is_predicted_as_far_as_rows_tell_it_and_a_burst_is_
     Z = rng.normal(size=(2000, 2))
     y = Z @ [1.5, -0.5] + rng.normal(size=2000)
     y[100:160] += 40.0 * np.sign(Z[100:160, 0])
-    np.testing.assert_allclose(friction_of_the_day._predicted(Z, y, 1.0), [1.5, -0.5], atol=0.1)
+    np.testing.assert_allclose(predicted(Z, y, np.ones(2), 1.0), [1.5, -0.5], atol=0.1)
     # of rows that all say the same there are few: a prediction is drawn to none
-    np.testing.assert_allclose(friction_of_the_day._predicted(Z, y, 2000.0), [0.75, -0.25], atol=0.1)
+    np.testing.assert_allclose(predicted(Z, y, np.ones(2), 2000.0), [0.75, -0.25], atol=0.1)
 
 
 def test_friction_that_logs_do_not_tell_or_that_is_small_is_no_matter(model: ReconstructedModel) -> None:
@@ -142,7 +143,7 @@ def test_friction_that_logs_do_not_tell_or_that_is_small_is_no_matter(model: Rec
 
 
 def told(laws: list[str], events: int = 0, verdict: str = "effects_found", unlisted: int = 0) -> Any:
-    found = [SimpleNamespace(effect=SimpleNamespace(place=name)) for name in laws]
+    found = [SimpleNamespace(effect=SimpleNamespace(place=(name, None, None), name=name)) for name in laws]
     outcome = SimpleNamespace(found=found)
     return SimpleNamespace(
         verdict=verdict, laws=["a law"] * unlisted, outcome=outcome, contacts=["push"] * events
@@ -157,6 +158,8 @@ def told(laws: list[str], events: int = 0, verdict: str = "effects_found", unlis
         (told(["payload"]), told(["payload"]), True),
         (told(["payload"]), told(["payload", "viscous_friction"]), False),
         (told(["payload"]), told([]), True),
+        (told(["carried_load"]), told(["payload"]), False),  # a body since 13 s, in three pieces
+        (told(["carried_load", "torque_gain"]), told(["payload"]), True),
         (told([], 1), told([]), True),
         (told([], 2), told([], 1), False),
         (told(["payload"], 1), told(["payload"], 1), False),

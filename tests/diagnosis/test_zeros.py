@@ -52,8 +52,8 @@ def test_zeros_are_taken_off_log_by_log(
 ) -> None:
     """To three standard errors of independent noise of Student's t, whose Fisher information is (f + 1) / (f + 3)."""
     slopes: list[np.ndarray] = []
-    robust, known = of_zeros._robust, (of_zeros._FREEDOM + 1) / (of_zeros._FREEDOM + 3)
-    monkeypatch.setattr(of_zeros, "_robust", lambda X, y, spreads: slopes.append(X) or robust(X, y, spreads))
+    robust, known = of_zeros.predicted, (of_zeros._FREEDOM + 1) / (of_zeros._FREEDOM + 3)
+    monkeypatch.setattr(of_zeros, "predicted", lambda X, *others: slopes.append(X) or robust(X, *others))
     logs = [run(seed, (0.0, 0.04, -0.02)), run(seed + 1)]
     own, zeros = settled(model, logs)
     for X, found, true in zip(slopes, zeros, ([0.04, -0.02], [0.0, 0.0]), strict=True):
@@ -87,13 +87,17 @@ def test_zeros_are_as_large_as_they_usually_are(
 ) -> None:
     """Joint 1, whose zero gravity does not feel, and 2, of which the data say much, by the prior's spread alone."""
     X, y = np.array([[0.0, 1.0]] * 40), np.full(40, 0.5)
-    wide, narrow = (of_zeros._robust(X, y, np.array([0.1, spread])) for spread in (100.0, 0.05))
+    wide, narrow = (
+        of_zeros.predicted(X, y, np.array([0.1, spread]), INDEPENDENT) for spread in (100.0, 0.05)
+    )
     assert wide == pytest.approx([0.0, 0.5], abs=1e-3)
     told = 40 / INDEPENDENT * 5 / (4 + (0.5 - narrow[1]) ** 2)
     assert narrow == pytest.approx([0.0, 0.5 * told / (told + 1 / 0.05**2)])
     # and that spread is the training logs'
     asked: list[np.ndarray] = []
-    monkeypatch.setattr(of_zeros, "_robust", lambda X, y, spreads: asked.append(spreads) or 0 * spreads)
+    monkeypatch.setattr(
+        of_zeros, "predicted", lambda X, y, spreads, memory: asked.append(spreads) or 0 * spreads
+    )
     settled(model, [run(3)])
     assert asked[0].tolist() == SPREAD[1:]
 

@@ -20,12 +20,11 @@ import numpy as np
 
 from armloop.diagnosis.evidence import Evidence, Whitening
 from armloop.diagnosis.verdict import Diagnosis
+from armloop.diagnosis.zeros import predicted
 from armloop.identification.uncertainty import friction_directions
-from armloop.laws.effects import effect
+from armloop.laws.effects import Effect, effect
 from armloop.laws.effects.base import Estimate
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.regression.embedded import ITERATIONS
-from armloop.util.arrays import Array
 
 #: Friction of the day is asked for where it is this part of a joint's baseline or more.
 _FELT = 0.5
@@ -34,8 +33,6 @@ _SAID = (
     "Friction differs from log to log by so much that it would hide some of this: it was judged beside the run's own dry "
     "and viscous friction, as far as that is within what differs, and by what the model leaves of logs that it knows"
 )
-#: Degrees of freedom of Student's t, by which samples that an event or an effect moves weigh less.
-_FREEDOM = 4.0
 
 
 def of_the_day(
@@ -64,7 +61,7 @@ def of_the_day(
             continue
         memories[j] = _memory(bare, j)
         Z = directions[rows, j] @ roots[j] / bare.scale[j]
-        own = roots[j] @ _predicted(Z, residual[rows, j] / bare.scale[j], memories[j])
+        own = roots[j] @ predicted(Z, residual[rows, j] / bare.scale[j], np.ones(2), memories[j])
         taken[:, j] = directions[:, j] @ own
         added += [_friction(name, j + 1, float(value)) for name, value in zip(_KINDS, own, strict=True)]
     day = Evidence.of(alone.with_effects(added), whole.samples, list(whole.asked))
@@ -92,10 +89,18 @@ def says_more(found: Diagnosis, other: Diagnosis) -> bool:
     """
     if found.verdict != "effects_found" or found.laws:
         return False
-    mine, others = ({one.effect.place for one in each.outcome.found} for each in (found, other))
+    mine, others = ({_cause(one.effect) for one in each.outcome.found} for each in (found, other))
     if mine != others:
         return bool(mine - others)
-    return not other.contacts and bool(found.contacts or mine)
+    same = {one.effect.place for one in found.outcome.found} == {
+        one.effect.place for one in other.outcome.found
+    }
+    return same and not other.contacts and bool(found.contacts or mine)
+
+
+def _cause(one: Effect) -> tuple[object, ...]:
+    """What an effect is of: a body is one whether it is there all the while or comes and goes."""
+    return ("a body",) if one.name in ("payload", "carried_load") else one.place
 
 
 _KINDS = ("coulomb_friction", "viscous_friction")
@@ -113,16 +118,3 @@ def _memory(evidence: Evidence, j: int) -> float:
     time = evidence.samples.motion.time[evidence.rows[:, j]]
     period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     return max(1.0, seconds / period) if period > 0 else 1.0
-
-
-def _predicted(Z: Array, y: Array, memory: float) -> Array:
-    """(k,) random effects of unit variance that rows y (R,) show by columns Z (R, k), robustly."""
-    b: Array = np.zeros(Z.shape[1])
-    weight: Array = np.ones(len(y))
-    for _ in range(ITERATIONS):
-        W = Z * weight[:, None] / memory
-        b = np.linalg.solve(W.T @ Z + np.eye(len(b)), W.T @ y).astype(float)
-        left = y - Z @ b
-        size = max(float(np.median(np.abs(left))) / 0.6745, 1.0)
-        weight = (_FREEDOM + 1) / (_FREEDOM + (left / size) ** 2)
-    return b

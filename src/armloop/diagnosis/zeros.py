@@ -74,19 +74,20 @@ def _zeros(model: ReconstructedModel, log: MotionLog, usual: Array) -> Array:
     )
     own, zeros = usual > 0, np.zeros(model.arm.n)
     # one that was changed is regressed beside the others, so that they do not stand in for it
-    zeros[own] = _robust(slopes[:, own], left, usual[own])
+    zeros[own] = predicted(slopes[:, own], left, usual[own], INDEPENDENT)
     return np.where(np.abs(zeros) > SIGNIFICANCE * usual, 0.0, zeros)
 
 
-def _robust(X: Array, y: Array, spreads: Array) -> Array:
+def predicted(X: Array, y: Array, spreads: Array, memory: float) -> Array:
     """(p,) posterior mode of normal effects in noise of Student's t, of unit scale, by reweighting.
 
-    As many samples as lie in a period of the filter's corner tell no more than one does.
+    Args:
+        memory: so many rows tell no more than one does: of samples, those that lie in a period of the filter's corner.
     """
     weight: Array = np.ones(len(y))
     x: Array = np.zeros(X.shape[1])
     for _ in range(ITERATIONS):
-        G = (X.T * weight) @ X / INDEPENDENT + np.diag(1 / spreads**2)
-        x = np.asarray(np.linalg.solve(G, (X.T * weight) @ y / INDEPENDENT))
+        G = (X.T * weight) @ X / memory + np.diag(1 / spreads**2)
+        x = np.asarray(np.linalg.solve(G, (X.T * weight) @ y / memory))
         weight = np.asarray((_FREEDOM + 1) / (_FREEDOM + (y - X @ x) ** 2))
     return np.asarray(x)
