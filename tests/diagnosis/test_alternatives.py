@@ -25,7 +25,7 @@ from armloop.laws.effects.onset import Onset
         (
             ("quadratic_drag", 2),
             ("joint_spring", 2),
-            "joint_spring at joint 2 explains held-out data nearly as",
+            "joint spring at joint 2 explains held-out data nearly as",
         ),
     ],
 )
@@ -54,5 +54,5 @@ def test_no_further_run_is_said_to_tell_what_an_event_was(found, rival):
 def test_of_an_event_and_an_effect_that_lasts_a_further_run_shows_the_latter():
     spring = effect("joint_spring", 2)
     for words in (why_alike(_FOR_A_TIME, spring), why_alike(spring, _FOR_A_TIME)):
-        assert "a further run tells whether joint_spring at joint 2 is still there" in words
-        assert "without torque_offset at joint 2, which was an event" in words
+        assert "a further run tells whether joint spring at joint 2 is still there" in words
+        assert "without torque offset at joint 2, which was an event" in words

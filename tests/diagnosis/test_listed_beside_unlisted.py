@@ -72,7 +72,7 @@ def test_a_stop_stands_in_for_no_law_of_which_it_leaves_much_that_is_none(model:
     """To one side of a torque that grows to both a stop is near, and what it leaves is no law of the library."""
     found, _ = told(model, 1, lambda q, v: q[:, 1] ** 4)
     assert (found.verdict, found.outcome.found) == ("unlisted_effect", []) and found.unlisted is not None
-    assert found.unlisted.rmse_with_form < 0.2 * found.unlisted.rmse and "upper_end_stop" in found.reasons[0]
+    assert found.unlisted.rmse_with_form < 0.2 * found.unlisted.rmse and "upper end stop" in found.reasons[0]
 
 
 def test_a_cable_that_pulls_taut_is_a_stop(model: ReconstructedModel) -> None:
@@ -96,4 +96,4 @@ def test_dry_friction_that_depends_on_the_posture_is_more_than_its_mean(model: R
     assert set(law.parameters) - set(RANGE) == {"cos(q1)*sign(v2)"}
     assert float(law.parameters["cos(q1)*sign(v2)"].value) == pytest.approx(truth[0], rel=0.02)
     assert law.rmse_with_form < 1.1 * law.baseline
-    assert found.reasons[0].startswith("coulomb_friction at joint 2 would explain 8")
+    assert found.reasons[0].startswith("coulomb friction at joint 2 would explain 8")

@@ -139,9 +139,9 @@ def test_of_a_joint_of_which_something_hidden_is_told_nothing_else_is_suspected(
         and "a gear" in reasons
     )
     assert answers.asked["suspected"] == ("account", [], asked)
-    assert any("viscous_friction at joint 2 would explain" in reason for reason in reasons) == (not asked)
+    assert any("viscous friction at joint 2 would explain" in reason for reason in reasons) == (not asked)
     (said,) = [
-        reason for reason in reasons if "joint 2: coulomb_friction at joint 2 would explain 80%" in reason
+        reason for reason in reasons if "joint 2: coulomb friction at joint 2 would explain 80%" in reason
     ]
     assert ("no more than the model leaves" in said) == bool(asked)
 
@@ -321,7 +321,7 @@ def test_an_event_within_two_errors_of_none_goes_and_is_told(monkeypatch: pytest
     answers = Answers(monkeypatch, contacts=[CONTACT, vague])
     made = judged()
     assert made.contacts == [CONTACT] and made.model == ("with", "push")
-    said = "from 3.0 to 4.0 s external_torque at joint 2 would explain what is left, but it is 1.9 of its stated errors"
+    said = "from 3.0 to 4.0 s external torque at joint 2 would explain what is left, but it is 1.9 of its stated errors"
     assert made.reasons[0].startswith(said)
     vague.clear = 2.0
     assert judged().contacts == [CONTACT, vague] and answers.asked["found"]

@@ -118,7 +118,7 @@ class TestReasons:
         assert len(words) == said
         if said:
             assert "0.5% (dry) and 1.1% (viscous) of it" in words[0]
-            assert "and coulomb_friction at joint 2, viscous_friction at joint 3 may be no more" in words[0]
+            assert "and coulomb friction at joint 2, viscous friction at joint 3 may be no more" in words[0]
         assert reasons.of_too_few_logs(model, found[:1]) == []
 
     def test_slower_than_in_training(self, monkeypatch: pytest.MonkeyPatch) -> None:

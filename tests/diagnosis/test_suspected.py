@@ -48,7 +48,7 @@ def test_a_small_law_is_said_and_not_stated(model: ReconstructedModel, seed: int
     verdict, (said,) = hints(model, run(seed, 60.0, small))
     assert verdict == "no_effect"
     # the same of one that the search had named, and took back
-    assert "coulomb_friction at joint 2 would explain " in said and "at its worst" in said
+    assert "coulomb friction at joint 2 would explain " in said and "at its worst" in said
 
 
 @pytest.mark.parametrize("known", [{"predictable_left": 1e-4, "std_error": 1e-6, "noise": 1e-4}, {}])
@@ -149,4 +149,4 @@ def asked_of(
 )
 def test_the_sentence_names_the_joints(small: bool, errors: float, why: str) -> None:
     said = too_little("time_delay", (0, 2), 0.5, small, errors)
-    assert said.startswith("joints 1, 3: time_delay would explain 50%") and why in said
+    assert said.startswith("joints 1, 3: time delay would explain 50%") and why in said

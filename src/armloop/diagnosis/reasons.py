@@ -174,11 +174,16 @@ def _named(joints: Sequence[int]) -> str:
     return f"joint{'s' * (len(joints) > 1)} {', '.join(str(j + 1) for j in joints)}"
 
 
+def spaced(label: str) -> str:
+    """An effect's label in words."""
+    return label.replace("_", " ")
+
+
 def in_doubt(label: str, share: float) -> str:
     """A sentence on an effect that removes less than what nothing accounts for where it acts."""
     return (
-        f"{label} would remove {share:.0%} of what can be explained, but more is left there that nothing accounts for: it "
-        "may be of the same origin, and is not stated"
+        f"{spaced(label)} would remove {share:.0%} of what can be explained, but more is left there that nothing accounts "
+        "for: it may be of the same origin, and is not stated"
     )
 
 
@@ -187,6 +192,7 @@ def masked(labels: Sequence[str]) -> list[str]:
     if not labels:
         return []
     is_no, it_is = ("is no", "it is") if len(labels) == 1 else ("are no", "they are")
+    labels = [spaced(label) for label in labels]
     which = " and ".join(filter(None, [", ".join(labels[:-1]), labels[-1]]))
     return [
         f"{which} would explain some of what is left there, but {is_no} larger than what the model's own coefficients may "
@@ -217,7 +223,7 @@ def unlike(names: Sequence[str], others: Sequence[tuple[Sequence[str], Sequence[
 
 def of_too_few_logs(model: ReconstructedModel, found: Sequence[_Named]) -> list[str]:
     """A sentence on friction that is found by a model of too few logs to tell the variance between them."""
-    rubbing = [f.effect.label() for f in found if f.effect.rubs and not f.always]
+    rubbing = [spaced(f.effect.label()) for f in found if f.effect.rubs and not f.always]
     if not rubbing or model.uncertainty.get("between_logs_known") != "assumed":
         return []
     return [
@@ -242,16 +248,16 @@ def too_little(label: str, joints: Sequence[int], share: float, small: bool, err
     else:
         why = "it does not pass all that is asked of a law"
     return (
-        f"{_named(joints)}: {label} would explain {share:.0%} of what is left beyond the baseline, which is no chance; it "
-        f"is not stated, for {why}"
+        f"{_named(joints)}: {spaced(label)} would explain {share:.0%} of what is left beyond the baseline, which is no "
+        f"chance; it is not stated, for {why}"
     )
 
 
 def part_of_a_law(labels: Sequence[str], joint: int, share: float, times: float) -> str:
     """A sentence on effects that explain a part (of the energy) of what a law does, and leave so many times more (RMS)."""
     return (
-        f"{' and '.join(labels)} would explain {share:.0%} of joint {joint}'s residual, but leave {times:.1f} times what "
-        "the law does that is stated in place of it"
+        f"{spaced(' and '.join(labels))} would explain {share:.0%} of joint {joint}'s residual, but leave {times:.1f} "
+        "times what the law does that is stated in place of it"
     )
 
 
@@ -301,8 +307,8 @@ def event_in_doubt(event: AddedEffect) -> str:
     """A sentence on an event that removes no more than twice what nothing accounts for at other times."""
     start, end = ends(event.parameters)
     return (
-        f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but half as much or more is "
-        "left there at other times that nothing accounts for: it may be of the same origin, and is not stated"
+        f"from {start:.1f} to {end:.1f} s {spaced(event.effect.label())} would explain what is left, but half as much or "
+        "more is left there at other times that nothing accounts for: it may be of the same origin, and is not stated"
     )
 
 
@@ -310,8 +316,8 @@ def event_unclear(event: AddedEffect, clear: float) -> str:
     """A sentence on an event that is within two of its stated errors of none (Wald test)."""
     start, end = ends(event.parameters)
     return (
-        f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but it is {clear:.1f} of its "
-        "stated errors from none, which hold what is left at other times: it is not stated"
+        f"from {start:.1f} to {end:.1f} s {spaced(event.effect.label())} would explain what is left, but it is {clear:.1f} "
+        "of its stated errors from none, which hold what is left at other times: it is not stated"
     )
 
 
@@ -319,8 +325,8 @@ def event_untold(event: AddedEffect) -> str:
     """A sentence on an event of a run that is too short to tell it from a law."""
     start, end = ends(event.parameters)
     return (
-        f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but the rest of the run is too "
-        "short, or leaves too much, to tell it from a law of the motion: it is not stated"
+        f"from {start:.1f} to {end:.1f} s {spaced(event.effect.label())} would explain what is left, but the rest of the "
+        "run is too short, or leaves too much, to tell it from a law of the motion: it is not stated"
     )
 
 

@@ -13,7 +13,7 @@ from armloop.diagnosis import probability
 from armloop.diagnosis.contacts import Contact
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.outcomes import Found, Outcome, Strength
-from armloop.diagnosis.reasons import Standing, too_still, unlike
+from armloop.diagnosis.reasons import Standing, spaced, too_still, unlike
 from armloop.diagnosis.reversals import AtReversals
 from armloop.diagnosis.score import mean_by_joint, ratio
 from armloop.diagnosis.unlisted import Unlisted
@@ -213,7 +213,7 @@ def _alternatives(effect: Effect, confounded: list[tuple[Effect, float]]) -> lis
 
 def why_alike(found: Effect, rival: Effect) -> str:
     """Why two effects can look alike on one motion, and what would tell them apart: a sentence."""
-    alike = f"on this motion {rival.label()} explains held-out data nearly as well as {found.label()}"
+    alike = f"on this motion {spaced(rival.label())} explains held-out data nearly as well as {spaced(found.label())}"
     if found.event and rival.event:
         return (
             f"{alike}; what was there for a time is over, and no further run tells them apart: only what is known of "
@@ -222,8 +222,8 @@ def why_alike(found: Effect, rival: Effect) -> str:
     if found.event or rival.event:
         lasting, over = (rival, found) if found.event else (found, rival)
         return (
-            f"{alike}; a further run tells whether {lasting.label()} is still there, without {over.label()}, which was "
-            "an event of this run"
+            f"{alike}; a further run tells whether {spaced(lasting.label())} is still there, without "
+            f"{spaced(over.label())}, which was an event of this run"
         )
     listed = _said(found, rival)
     if listed and (found.joint is None or rival.joint is None or found.joint == rival.joint):

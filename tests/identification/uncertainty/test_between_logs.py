@@ -231,7 +231,7 @@ def test_what_differs_from_log_to_log_is_no_change_of_the_next(models: tuple[Any
     """
     differing, alike = models
     found = diagnose(differing, [worn(9, 1.5, 24.0)], jobs=1)
-    assert found.named == [] and found.reasons[0].startswith("coulomb_friction at joint 2 would explain some")
+    assert found.named == [] and found.reasons[0].startswith("coulomb friction at joint 2 would explain some")
     assert diagnose(alike, [worn(9, 0.5, 24.0)], jobs=1).named == [("coulomb_friction", 2)]
     assert diagnose(differing, [worn(9, 4.0, 24.0)], jobs=1).named == [("coulomb_friction", 2)]
 

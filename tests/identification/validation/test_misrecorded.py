@@ -176,6 +176,7 @@ def test_currents_that_are_said_to_be_torques_are_told_by_the_models_gains(model
     assert said(geared, replace(log, tau=log.tau / gains)).startswith(
         "tau seems to be motor current: times the"
     )
+    assert said(geared, replace(log, tau=log.tau * gains)).startswith("tau seems to be torque already, which")
     assert said(geared, log) == ""
     assert not said(geared, replace(log, tau=log.tau / [3.0, 12.0, 0.5])).startswith("tau seems to be")
     assert not said(model, replace(log, tau=log.tau / gains)).startswith("tau seems to be")

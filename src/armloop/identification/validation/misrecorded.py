@@ -42,6 +42,12 @@ _UNITS = {
     8.85075: "lbf·in",
 }
 _NEAR = 1.2
+#: What torques are that the model's drive gains, to such a power, make right.
+_IN_GAINS = {
+    1: "tau seems to be motor current: times the model's drive gains it is what the model gives; give it as A",
+    -1: "tau seems to be torque already, which the model's drive gains were multiplied with: without them it is what the "
+    "model gives; say that it is torque (--tau-unit 'N*m')",
+}
 
 
 def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
@@ -57,9 +63,10 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
     usual = _usual(model, samples)
     predicted = smooth(samples, model.predict(samples.motion))
     if gains := model.recorded["drive_gains"]:
-        torques = replace(samples, tau=samples.tau * np.asarray(gains))
-        if _far_better(left, _relative(torques.tau - predicted, torques), _usual(model, torques)):
-            return "tau seems to be motor current: times the model's drive gains it is what the model gives; give it as A"
+        for power, said in _IN_GAINS.items():
+            torques = replace(samples, tau=samples.tau * np.asarray(gains) ** power)
+            if _far_better(left, _relative(torques.tau - predicted, torques), _usual(model, torques)):
+                return said
     gain = _common_gain(samples, predicted)
     if gain and _far_better(left, _relative(samples.tau - gain * predicted, samples), usual):
         return _factor(gain, "A" if model.in_amperes else "N·m (N)")
