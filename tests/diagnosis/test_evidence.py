@@ -91,6 +91,7 @@ def test_a_models_own_errors_are_weighted_like_the_rows(monkeypatch: pytest.Monk
         _places=np.array([0, 2, 3]),
         scale=np.array([0.5, 4.0]),
         with_assumed=True,
+        _whitened=lambda x: x,
     )
     expected = [errors[0, 0] / 0.5, errors[2, 0] / 0.5, errors[2, 1] / 4, errors[3, 1] / 4]
     for _ in range(2):  # the second time what is kept
