@@ -19,8 +19,9 @@ from armloop.diagnosis.evidence import Evidence, Whitening
 from armloop.diagnosis.friction_of_the_day import of_the_day, says_more
 from armloop.diagnosis.zeros import predicted
 from armloop.identification.reconstruction import Options, reconstruct
-from armloop.laws.effects import hypotheses
-from armloop.model import ReconstructedModel
+from armloop.laws.effects import effect, hypotheses
+from armloop.laws.effects.base import Estimate
+from armloop.model import AddedEffect, ReconstructedModel
 
 #: By how much the grease of three days differs, and how much thinner or thicker it is than in the mean.
 VISCOUS, DAYS = np.array([4.0, 3.0, 1.0]), (0.0, 0.15, 0.4)
@@ -86,6 +87,42 @@ def test_a_push_is_seen_that_friction_of_another_day_would_hide(model: Reconstru
     (event,) = diagnose(model, [run(9, 0.3, push=3.0)], jobs=1).contacts
     start, end = (float(np.asarray(event.added.parameters[key].value)) for key in ("start", "end"))
     assert event.added.effect.joint == 2 and abs(start - 12) < 0.3 and abs(end - 13) < 0.3
+
+
+def test_what_was_found_is_no_part_of_the_friction_that_is_taken_off(model: ReconstructedModel) -> None:
+    whole = evidence(model, run(10, 0.3, dry=0.8))
+    known = AddedEffect(effect("coulomb_friction", 2), {"level": Estimate(0.8, 0.04, "N*m")})
+    levels = []
+    for beside in ([], [known]):
+        found = of_the_day(whole, beside)
+        assert found is not None
+        levels += [a.values["level"] for a in found[1] if a.effect.place == known.effect.place]
+    assert 0.4 < levels[0] - levels[1] < 0.9  # robustly, and a part of it goes with the viscous coefficient
+
+
+def test_a_joint_whose_residual_remembers_tells_less_of_its_friction(model: ReconstructedModel) -> None:
+    whole = evidence(model, run(7, 0.1))
+    joints = [{**one, "correlation_time": 0.5} for one in model.baseline["joints"] or [{}] * 3]
+    slow = replace(whole, model=replace(model, baseline={**model.baseline, "joints": joints}))
+    found = of_the_day(slow)
+    assert found is not None and found[0].whitening is not None
+    time = whole.samples.motion.time[whole.rows[:, 0]]
+    assert found[0].whitening.memories[0] == pytest.approx(0.5 / np.median(np.diff(time)))
+
+
+@pytest.mark.parametrize(("part", "asked"), [(0.6, True), (0.4, False)])
+def test_friction_of_the_day_is_asked_for_from_half_of_the_baseline_on(
+    part: float, asked: bool, model: ReconstructedModel
+) -> None:
+    alone = replace(model, uncertainty={**model.uncertainty, "between_logs": None})
+    log = run(7, 0.1)
+    bare, whole = evidence(alone, log), evidence(model, log)
+    between = np.sqrt(whole.scale**2 - bare.scale**2)
+    # of every joint that part of what the whole comes to
+    times = (part / np.sqrt(1 - part**2) * bare.scale / between) ** 2
+    less = [(x * np.array(T)).tolist() for x, T in zip(times, model.uncertainty["between_logs"], strict=True)]
+    found = of_the_day(evidence(replace(model, uncertainty={**model.uncertainty, "between_logs": less}), log))
+    assert (found is not None) is asked
 
 
 def test_rows_are_whitened_by_the_covariance_of_a_mixed_model() -> None:
