@@ -15,6 +15,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 from armloop.data.log import MotionLog
 from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose, friction_of_the_day
+from armloop.diagnosis.beside import known_by
 from armloop.diagnosis.evidence import Evidence, Whitening
 from armloop.diagnosis.friction_of_the_day import of_the_day, says_more
 from armloop.diagnosis.zeros import predicted
@@ -98,6 +99,14 @@ def test_what_was_found_is_no_part_of_the_friction_that_is_taken_off(model: Reco
         assert found is not None
         levels += [a.values["level"] for a in found[1] if a.effect.place == known.effect.place]
     assert 0.4 < levels[0] - levels[1] < 0.9  # robustly, and a part of it goes with the viscous coefficient
+
+
+def test_a_search_beside_something_found_is_beside_the_friction_as_well(model: ReconstructedModel) -> None:
+    found = of_the_day(evidence(model, run(7, 0.1)))
+    assert found is not None
+    load = AddedEffect(effect("torque_offset", 1), {"offset": Estimate(0.1, 0.01, "N*m")})
+    seen = known_by(found[0], [load])
+    assert seen.whitening is found[0].whitening and seen.model.effects[-1] is load
 
 
 def test_a_joint_whose_residual_remembers_tells_less_of_its_friction(model: ReconstructedModel) -> None:
