@@ -111,3 +111,15 @@ def test_a_later_run_feels_the_sum_of_weight_and_spring(tmp_path: Path) -> None:
     # a file from before the spring was an unknown
     old = replace(kept, uncertainty=alone.uncertainty)
     np.testing.assert_allclose(torque_errors(old, other), few)
+
+
+def test_a_joint_whose_directions_a_file_lacks_has_no_errors_of_another() -> None:
+    """Terms of joints may have one name, a constant for example."""
+    model = replace(bare(), effects=())
+    data = samples(model, 1000, 5, NOISE)
+    found = standard_errors(model, data, fitted(data))
+    (whole,) = found["torque"]
+    few = [k for k, name in enumerate(whole["unknowns"]) if name.startswith("sign")]
+    other = {"unknowns": [whole["unknowns"][few[0]], "v9", "1"], "directions": ["1", "0 1", "0 0 1"]}
+    lost = replace(model, uncertainty={**found, "torque": [other]})
+    assert torque_errors(lost, data)[:, :, :0].shape == torque_errors(lost, data).shape
