@@ -3,7 +3,8 @@
 Where a model's training logs differ in friction, as where drives warm up, a run's residual is weighed by that, and effects
 below it are not seen. Friction of the day has a shape, though: a dry level and a viscous coefficient of each joint, of a
 covariance that the logs tell. Here every hypothesis is asked beside it: rows are whitened by the covariance of a mixed
-model, 1 + Z Z' (Aitken's generalised least squares), and weighed by what the model leaves of a log that it knows. Of
+model, 1 + Z Z' (Aitken's generalised least squares), and weighed by what the model leaves of a log that it knows. Whitened
+rows are uncorrelated, so that a fold judges as before; of what it holds the others have these two numbers a joint alone. Of
 whatever looks at the residual itself the friction is taken off first, by its best linear unbiased prediction (Henderson,
 Biometrics 31, 1975), beside what was found.
 
@@ -28,10 +29,13 @@ from armloop.model import AddedEffect, ReconstructedModel
 
 #: Friction of the day is asked for where it is this part of a joint's baseline or more.
 _FELT = 0.5
+#: What it is of, as the columns of what friction differs by.
+_KINDS = ("coulomb_friction", "viscous_friction")
 #: What is said of a verdict beside it.
 _SAID = (
     "Friction differs from log to log by so much that it would hide some of this: it was judged beside the run's own dry "
-    "and viscous friction, as far as that is within what differs, and by what the model leaves of logs that it knows"
+    "and viscous friction, as far as that is within what differs, without which residuals are stated, and by what the model "
+    "leaves of logs that it knows"
 )
 
 
@@ -54,18 +58,19 @@ def of_the_day(
         return None
     directions, roots = friction_directions(model, whole.samples)
     residual, added = bare.left_by(alone.with_effects(known)), list[AddedEffect]()
+    columns = np.einsum("njk,jkl->njl", directions, roots)
     taken, memories = np.zeros_like(residual), np.ones(model.arm.n)
     for j in range(model.arm.n):
         rows = np.flatnonzero(bare.rows[:, j])
         if not roots[j].any() or not len(rows):
             continue
         memories[j] = _memory(bare, j)
-        Z = directions[rows, j] @ roots[j] / bare.scale[j]
-        own = roots[j] @ predicted(Z, residual[rows, j] / bare.scale[j], np.ones(2), memories[j])
-        taken[:, j] = directions[:, j] @ own
-        added += [_friction(name, j + 1, float(value)) for name, value in zip(_KINDS, own, strict=True)]
+        Z, y = (x[rows, j] / bare.scale[j] for x in (columns, residual))
+        own = predicted(Z, y, np.ones(2), memories[j])
+        taken[:, j] = columns[:, j] @ own
+        pairs = zip(_KINDS, (roots[j] @ own).tolist(), strict=True)
+        added += [_friction(name, j + 1, value) for name, value in pairs]
     day = Evidence.of(alone.with_effects(added), whole.samples, list(whole.asked))
-    columns = np.einsum("njk,jkl->njl", directions, roots)
     return replace(day, whitening=Whitening(columns, memories, taken)), added
 
 
@@ -101,9 +106,6 @@ def says_more(found: Diagnosis, other: Diagnosis) -> bool:
 def _cause(one: Effect) -> tuple[object, ...]:
     """What an effect is of: a body is one whether it is there all the while or comes and goes."""
     return ("a body",) if one.name in ("payload", "carried_load") else one.place
-
-
-_KINDS = ("coulomb_friction", "viscous_friction")
 
 
 def _friction(name: str, joint: int, value: float) -> AddedEffect:
