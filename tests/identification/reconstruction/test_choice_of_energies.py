@@ -149,6 +149,8 @@ def test_a_constant_force_is_weight_where_a_slide_lifts_it_and_an_offset_elsewhe
     lagrangian._choose(library, data, weights, [])
     near = sorted({0, 1, 4, int(np.argmax(gained))})
     assert (given[-1]["library"].degrees == degrees[near]).all() and asked[-1][3] == len(near)
+    # what is always there has other places among them
+    assert asked[-1][2] == [0, 1, *range(len(near), len(near) + 2 * len(FRICTION))]
 
 
 def test_a_joint_that_never_slides_fast_is_told_by_its_number() -> None:
