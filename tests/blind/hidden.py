@@ -17,7 +17,7 @@ from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
 
 #: Effects that the plant can have and no run is drawn with: what an arm is built with, and what has cases of its own.
-NOT_DRAWN = ("spring_balancer", "elastic_cable")
+NOT_DRAWN = ("spring_balancer", "counterbalance", "elastic_cable")
 KINDS = ("one", "one", "one", "one", "two", "clean", "unlisted")
 
 

@@ -38,7 +38,6 @@ from armloop.laws.effects.base import number
 from armloop.laws.effects.events import ends
 from armloop.laws.effects.found import RANGE
 from armloop.laws.effects.load_dependent_friction import LoadDependentFriction
-from armloop.laws.effects.spring_balancer import SpringBalancer
 from armloop.laws.effects.torque_gain import TorqueGain
 from armloop.laws.effects.torque_offset import TorqueOffset
 from armloop.model import AddedEffect, ReconstructedModel
@@ -292,7 +291,7 @@ def of_an_efficiency(added: Sequence[AddedEffect]) -> list[str]:
 
 def of_a_balancer(model: ReconstructedModel, laws: Sequence[_Law]) -> list[str]:
     """A sentence on each law of its own angle alone at a joint that a spring with levers pulls at: it may be the spring."""
-    sprung = {a.effect.joint for a in model.effects if isinstance(a.effect, SpringBalancer)}
+    sprung = {a.effect.joint for a in model.effects if a.effect.name in ("spring_balancer", "counterbalance")}
     return [
         f"joint {law.joint} has a spring that pulls by levers: one that has lost force, or its gas, leaves just such a law "
         "of the joint's angle alone"

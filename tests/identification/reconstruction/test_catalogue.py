@@ -230,6 +230,7 @@ class TestSearch:
     ) -> Any:
         return SimpleNamespace(
             place=(name, 1, None),
+            **{"name": name, "joint": 1, "beside": ()},
             complexity=complexity,
             needs_model=False,
             periodic=False,

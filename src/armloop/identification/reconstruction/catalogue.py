@@ -26,6 +26,7 @@ from scipy.stats import t as student
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.identification.reconstruction import differential
+from armloop.identification.reconstruction.companions import accompanied, companions, is_there
 from armloop.identification.reconstruction.lines import between, lines
 from armloop.identification.reconstruction.projected import CHANCE, Projected, Trial
 from armloop.laws.effects import Context, Effect, Estimate, hypotheses
@@ -180,8 +181,13 @@ class Laws:
     def notes(self, effects: Sequence[AddedEffect]) -> list[str]:
         """What was found, a line each, with the parameters of the model's effects."""
         return [
-            f"always there: {added.effect.sentence(added.parameters)}; fitted together with the rest, it removes "
-            f"{law.gain:.0%} of the squared error of the joint it shows on most, on left-out blocks"
+            f"always there: {added.effect.sentence(added.parameters)}"
+            + (
+                ""
+                if law.effect.beside
+                else f"; fitted together with the rest, it removes {law.gain:.0%} of the squared error of the joint it "
+                "shows on most, on left-out blocks"
+            )
             for law, added in zip(self.chosen, effects, strict=True)
         ]
 
@@ -191,7 +197,8 @@ def permanent(arm: Arm) -> list[Effect]:
 
     A joint's friction is none of them: it has the friction selection, which has had its say.
     """
-    return [e for e in hypotheses(arm, built_in=True) if not (e.rubs or e.memory or e.name in _OF_A_RUN)]
+    listed = [e for e in hypotheses(arm, built_in=True) if not (e.rubs or e.memory or e.name in _OF_A_RUN)]
+    return [effect for effect in listed if not effect.beside]
 
 
 #: An effect, its shapes with which of the coefficients of each it has, its trial, and how many shapes were asked.
@@ -246,6 +253,12 @@ def search(
             Law.found(effect, shape, effect.fixed_columns(context, shape), trial.share, among, kept)
             for shape, kept in parts.items()
         ]
+    for effect in companions(chosen):
+        for shape in effect.shapes(context):
+            law = Law.found(effect, shape, effect.fixed_columns(context, shape), 0.0)
+            if is_there(bench(chosen).trial(Laws([law]).columns(arm, samples), _NEW)):
+                progress(f"{effect.label()}: is there beside what was found")
+                chosen.append(law)
     return Laws(chosen, tried)
 
 
@@ -262,7 +275,11 @@ def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, sa
         others = laws.chosen[:k] + laws.chosen[k + 1 :]
         own, law = bench(others), laws.chosen[k]
         trial = own.trial(Laws([law]).columns(arm, samples))
-        if trial is None or not is_worth(trial, laws.tried * law.among):
+        if law.effect.beside:
+            stays = accompanied(law.effect, others) and is_there(trial)
+        else:
+            stays = trial is not None and is_worth(trial, laws.tried * law.among)
+        if not stays:
             return pruned(replace(laws, chosen=others), bench, arm, samples)
     return laws
 

@@ -163,6 +163,7 @@ class Effect(ABC):
             a hypothesis of a diagnosis.
         parameters: what it calls its numbers; as many are free (``complexity``) unless it says otherwise.
         built_in: whether an arm may be built with it, so that it is sought in training data, if it is not ``searched``.
+        beside: names of laws beside one of which, at the same joint, it is sought in training data, and there alone.
         needs_inertial: whether its columns are made of the known model's inertial parameters.
         needs_model: whether its columns depend on anything the known model says, not on the motion alone.
         mesh: columns of a nonlinear parameter between multiples of this may be interpolated; None where they may not.
@@ -198,6 +199,7 @@ class Effect(ABC):
     onset: Onset | Spells | None = None
     searched: ClassVar[bool] = True
     built_in: ClassVar[bool] = False
+    beside: ClassVar[tuple[str, ...]] = ()
     memory: ClassVar[bool] = False
     of_time: ClassVar[bool] = False
     watched: ClassVar[bool] = True

@@ -15,9 +15,9 @@ class SpringBalancer(Law):
     """tau_j += A_2 sin(2 q_j + φ_2) + A_3 sin(3 q_j + φ_3): what of a spring that pulls by levers is not as a weight.
 
     A force F between points at distances a and b from the axis, L² = a² + b² − 2ab cos(q − q_0) apart, is a torque
-    F(L) ab sin(q − q_0) / L: harmonics of the angle that decay by about ab/(a² + b²). The first is that of a weight, and no
-    motion tells them apart; of a rigid body's weight there are no others in its own angle. Force, levers and dead centre
-    are not stated: over a joint's travel many of them come to the same torque.
+    F(L) ab sin(q − q_0) / L: harmonics of the angle that decay by about ab/(a² + b²). The first is that of a weight, from
+    which inertia alone may tell it (:class:`.counterbalance.Counterbalance`); of a rigid body's weight there are no others
+    in its own angle. Force, levers and dead centre are not stated: over a joint's travel many come to the same torque.
     """
 
     name = "spring_balancer"
@@ -56,5 +56,5 @@ class SpringBalancer(Law):
         return (
             f"a spring pulls at joint {self.joint} by levers, as a gas spring or a balancer does: over its travel by "
             f"{second.words()} twice and {third.words()} three times a turn (phases {phase:.2f} and {other:.2f} rad); what "
-            "it pulls once a turn, as a weight does, is part of the first moments"
+            "it pulls once a turn, as a weight does, is part of the first moments unless it is stated by itself"
         )
