@@ -209,7 +209,9 @@ def test_units_that_contradict_the_motion_are_told(tmp_path, log, capsys):
     names = ["time [s]", *per_joint("pos{} [deg]", "vel{} [deg/s]", "torque{} [Nm]")]
     path = write(tmp_path / "t.csv", names, [log.time, np.degrees(log.q), log.v, log.tau], ",")
     assert main(["convert", str(path), "--suggest"]) == 0
-    assert "q changes 57.3 times as fast as v says" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "unit: '?'  # unsure: in the units that are stated q changes 57.3 times as fast as v says" in said
+    assert "unit: '?'  # unsure: by the motion, rad/s if q is in deg" in said
     assert fitting(180 / np.pi)[0] == ("deg", "rad/s")
 
 
@@ -271,9 +273,24 @@ def test_a_motion_log_that_is_not_in_si_units_is_not_called_sure(tmp_path, log, 
     write(path, ["time", *per_joint("q{}", "v{}", "tau{}")], [1e6 * log.time, log.q, log.v, log.tau], ",")
     assert main(["convert", str(path), "--suggest", "--map", str(place)]) == 0
     assert "v agrees with the rate of q if the unit is us, not s" in capsys.readouterr().out
-    place.write_text(place.read_text().replace("unit: s}", "unit: us}"))
+    place.write_text(place.read_text().replace("unit: '?'}", "unit: us}"))
     assert main(["convert", str(path), "--map", str(place), "--out", str(out)]) == 0
     np.testing.assert_allclose(read_log(out).time, log.time, atol=1e-9)
+
+
+def test_a_motion_log_in_degrees_is_asked_for_its_units(tmp_path, log, capsys):
+    path, place, out = tmp_path / "t.csv", tmp_path / "map.yaml", tmp_path / "o.csv"
+    write(
+        path, ["time", *per_joint("q{}", "v{}", "tau{}")], [log.time, np.degrees(log.q), log.v, log.tau], ","
+    )
+    assert main(["convert", str(path), "--out", str(out)]) == 2
+    assert "armloop convert --suggest asks for other units" in capsys.readouterr().err
+    assert main(["convert", str(path), "--suggest", "--map", str(place)]) == 0
+    text = place.read_text()
+    assert text.count("unit: '?'") == 2
+    place.write_text(text.replace("unit: '?'", "unit: deg", 1).replace("unit: '?'", "unit: rad/s", 1))
+    assert main(["convert", str(path), "--map", str(place), "--out", str(out)]) == 0
+    np.testing.assert_allclose(read_log(out).q, log.q, atol=1e-9)
 
 
 def test_counts_are_asked_about_and_converted_by_what_one_is(tmp_path, log, capsys):

@@ -47,7 +47,8 @@ def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str,
         unsure["time.unit"] = _time_evidence(recording, mapping)
     known = UNSAID not in mapping.q.names()
     if mapping.v is not None and known and not {"q.unit", "v.unit", "time.unit", "v"} & {*unsure}:
-        unsure |= _contradiction(recording, mapping, mapping.v)
+        mapping, asked = _asked_anew(recording, mapping, mapping.v)
+        unsure |= asked
     return mapping, unsure
 
 
@@ -60,18 +61,23 @@ def _of_positions(recording: Recording, quantity: QuantityMap) -> str:
     return f"{_range(recording, quantity)}: rad or deg?"
 
 
-def _contradiction(recording: Recording, mapping: Mapping, v: QuantityMap) -> dict[str, str]:
-    """What is wrong where v is not the rate of q in the units that the source says; nothing where that is not known."""
+def _asked_anew(recording: Recording, mapping: Mapping, v: QuantityMap) -> tuple[Mapping, dict[str, str]]:
+    """The map without units in which v is not the rate of q, whatever the source says, and what to ask about them."""
     clock, unit = mapping.time.column, canonical(mapping.time.unit or "", "time")
     if clock is None or unit is None:
-        return {}
+        return mapping, {}
     bare = rate_ratio(recording.columns[clock], recording, mapping.q, v)
     ratio = bare / FACTORS["time"][unit]
     if ratio == 0 or 0.7 < ratio < 1.4:
-        return {}
+        return mapping, {}
     if right := time_unit(bare):
-        return {"time": f"v agrees with the rate of q if the unit is {right}, not {unit}"}
-    return {"v": f"in these units q changes {ratio:.3g} times as fast as v says; is each of the units right?"}
+        asked = replace(mapping, time=replace(mapping.time, unit=None))
+        return asked, {"time": f"v agrees with the rate of q if the unit is {right}, not {unit}"}
+    asked = replace(mapping, q=replace(mapping.q, unit=None), v=replace(v, unit=None))
+    return asked, {
+        "q.unit": f"in the units that are stated q changes {ratio:.3g} times as fast as v says: rad or deg?",
+        "v.unit": _rates_that_fit(recording, asked),
+    }
 
 
 def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> str:

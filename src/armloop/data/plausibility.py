@@ -186,8 +186,9 @@ def _clock(log: Recorded) -> Iterator[Finding]:
         unit, in_unit = likely
         yield Finding(
             "column time",
-            f"has {rate:.3g} samples a second, as if it were in {unit} ({in_unit:.4g} Hz); time must be in s, and the "
-            f"motion of an arm takes {LEAST_RATE:g} samples a second or more, {MOST_RATE:g} at most",
+            f"has {rate:.3g} samples a second, as if it were in {unit} ({in_unit:.4g} Hz); time must be in s (armloop "
+            f"convert --suggest asks for other units), and the motion of an arm takes {LEAST_RATE:g} samples a second or "
+            f"more, {MOST_RATE:g} at most",
         )
 
 

@@ -94,7 +94,7 @@ def scale(windows: Windows) -> Iterator[Finding]:
             yield Finding(
                 f"column v{j + 1}",
                 f"is {factor:.3g} times the rate of q{j + 1}, {_likely_cause(factor)}; "
-                "time, q and v must be in s, rad (m) and rad/s (m/s)",
+                "time, q and v must be in s, rad (m) and rad/s (m/s); armloop convert --suggest asks for other units",
             )
 
 
