@@ -60,7 +60,13 @@ def test_friction_differs_by_more_than_the_model_leaves(model: ReconstructedMode
 
 @pytest.mark.parametrize("day", [-0.1, 0.2, 0.5])
 def test_friction_of_another_day_is_no_change(model: ReconstructedModel, day: float) -> None:
-    assert diagnose(model, [run(8, day)], jobs=1).named == []
+    found = diagnose(model, [run(8, day)], jobs=1)
+    assert found.named == [] and friction_of_the_day._SAID not in found.reasons
+    (said,) = [reason for reason in found.reasons if reason.endswith("nothing more was found")]
+    parts = [float(part) for part in said.split("joint by joint, ")[1].split(" %")[0].split(", ")]
+    # what the model leaves of a log that it knows, in parts of the baseline that is printed
+    rmse = np.array(found.model.baseline["rmse"])
+    np.testing.assert_allclose(parts, 100 * rmse / found.errors()["noise_floor"], atol=0.5)
 
 
 def test_a_gain_is_told_by_itself_and_the_model_is_as_it_was_made(model: ReconstructedModel) -> None:
@@ -244,6 +250,7 @@ def test_friction_is_taken_off_anew_beside_friction_that_was_found(
     monkeypatch.setattr(module, "_verdict", verdict)
     monkeypatch.setattr(module, "says_more", lambda found, other: more and other.of == "whole")
     monkeypatch.setattr(module, "of_that_day", lambda model, found, friction: (found.of, friction))
+    monkeypatch.setattr(module, "of_no_other_day", lambda found, whole, day: found)
     model: Any = SimpleNamespace(conditioning=None, arm=None)
     found, account = module._judged(model, [], print, 1)
     assert asked == ([[], added] if rubs else [[]]) and account == "account of whole"

@@ -18,7 +18,7 @@ from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, w
 from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
-from armloop.diagnosis.friction_of_the_day import of_that_day, of_the_day, says_more
+from armloop.diagnosis.friction_of_the_day import of_no_other_day, of_that_day, of_the_day, says_more
 from armloop.diagnosis.homogeneity import are_unlike, as_modelled, is_contradicted, leaves_much, names_of
 from armloop.diagnosis.judgement import CHANCE
 from armloop.diagnosis.onset import account_with_onsets
@@ -153,7 +153,9 @@ def _judged(
         day = again
         other, _ = _verdict(day[0], logs, progress, jobs)
     # accounts of several logs are compared as they are weighed at first
-    return of_that_day(model, other, day[1]) if says_more(other, found) else found, account
+    if says_more(other, found):
+        return of_that_day(model, other, day[1]), account
+    return of_no_other_day(found, whole, day[0]), account
 
 
 def _verdict(

@@ -86,6 +86,20 @@ def of_that_day(model: ReconstructedModel, found: Diagnosis, friction: Sequence[
     return replace(found, model=replace(model, effects=effects), standing=standing)
 
 
+def of_no_other_day(found: Diagnosis, whole: Evidence, day: Evidence) -> Diagnosis:
+    """A verdict beside which friction of the day tells no more, with a sentence on what its baseline is made of.
+
+    Args:
+        whole, day: the run, weighed with what friction differs by and without.
+    """
+    parts = ", ".join(f"{100 * part:.0f}" for part in day.scale / whole.scale)
+    said = (
+        "The baseline holds by how much friction differs between the training logs; without that it would be, joint by "
+        f"joint, {parts} % of it. Beside the run's own dry and viscous friction nothing more was found"
+    )
+    return replace(found, standing=replace(found.standing, reasons=[*found.standing.reasons, said]))
+
+
 def says_more(found: Diagnosis, other: Diagnosis) -> bool:
     """Whether a verdict beside the friction of the day is taken in the place of the other.
 
