@@ -89,6 +89,7 @@ class Answers:
                 and not self.given.get("untold")
             ),
             "event_untold": lambda event: f"not told: {event}",
+            "localised": lambda evidence, fit, left, known: [],
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
             "plainest": lambda evidence, outcome, among: self.note(
                 "plain", (evidence.name, list(among)), outcome

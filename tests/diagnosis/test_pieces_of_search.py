@@ -27,7 +27,7 @@ class Named(str):
     Of joint 1 are w to z, of joint 2 u, of both p.
     """
 
-    other_joint = None
+    other_joint, rubs = None, False
 
     @property
     def pair_wise(self) -> bool:

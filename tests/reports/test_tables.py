@@ -132,7 +132,7 @@ def test_why_a_controller_adds_nothing(loop: SimpleNamespace, clean: Diagnosis) 
     text = diagnosis_table(clean, close(model, clean.model, clean.samples))
     assert "The controller adds nothing: the model is what it was." in text
     found = [
-        AddedEffect(effect(name, joint), {}) for name, joint in (("torque_gain", 1), ("torque_offset", 2))
+        AddedEffect(effect(name, joint), {}) for name, joint in (("encoder_offset", 1), ("torque_offset", 2))
     ]
     event = AddedEffect(effect("external_contact", None), {})
     assert nothing_to_supply([*found, event]) == (

@@ -52,6 +52,7 @@ from armloop.diagnosis.suspected import suspected
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import without_laws
 from armloop.diagnosis.verdict import Diagnosis
+from armloop.diagnosis.whereabouts import localised
 from armloop.diagnosis.zeros import sentences, settled
 from armloop.identification.validation.misrecorded import misrecorded
 from armloop.laws.effects import Effect, hypotheses
@@ -296,5 +297,6 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     doubted += [*of_the_temperature(model, outcome.added()), *of_too_few_logs(model, outcome.found)]
     doubted += [*of_a_constant_pull(model, outcome.added()), *of_a_balancer(model, laws)]
     doubted += of_an_efficiency(outcome.added())
+    said = [*doubted, *stand.reasons, *localised(evidence, fitted, found.errors()["after"], known)]
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
-    return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))
+    return replace(found, verdict=verdict, standing=replace(stand, reasons=said))

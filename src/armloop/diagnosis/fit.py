@@ -121,7 +121,7 @@ class Fit:
     def _clear(self, spreads: Sequence[Array]) -> tuple[float, ...]:
         each = []
         for effect, free, spread in zip(self.effects, self.solution.free, spreads, strict=True):
-            own = slice(len(free) - effect.nested)
+            own = effect.alone(free)
             clearest = np.max(np.abs(free[own]) / np.sqrt(np.diag(spread)[own] + TINY), initial=0.0)
             each.append(max(float(clearest), deviate(*wald_statistic(free[own], spread[own, own]))))
         return tuple(each)

@@ -33,9 +33,9 @@ _FELT = 0.5
 _KINDS = ("coulomb_friction", "viscous_friction")
 #: What is said of a verdict beside it.
 _SAID = (
-    "Friction differs from log to log by so much that it would hide some of this: it was judged beside the run's own dry "
-    "and viscous friction, as far as that is within what differs, without which residuals are stated, and by what the model "
-    "leaves of logs that it knows"
+    "Friction that differs from log to log is much of the baseline and would hide some of this: it was judged beside the "
+    "run's own dry and viscous friction, as far as that is within what differs, without which residuals are stated, and by "
+    "what the model leaves of logs that it knows"
 )
 
 

@@ -77,6 +77,12 @@ class Outcome:
         return self.after.added()
 
     @property
+    def together(self) -> float:
+        """The part of the explainable held-out energy that all effects remove."""
+        whole = max(float(self.before.score.excess.sum()), 1e-9)
+        return min(gain(self.before.score, self.after.score) / whole, 1.0)
+
+    @property
     def hidden(self) -> list[Found]:
         """What is masked, and was not found."""
         there = {f.effect.place for f in self.found}

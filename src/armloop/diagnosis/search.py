@@ -22,7 +22,7 @@ from armloop.diagnosis.outcomes import Found, Outcome, clear, gradual, known_wit
 from armloop.diagnosis.posterior import ALTERNATIVE, log_posterior
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import PROMISING, Hypotheses, Known, Tried
-from armloop.laws.effects import Effect
+from armloop.laws.effects import Effect, effect
 from armloop.laws.effects.base import Place
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress, paced
@@ -33,6 +33,8 @@ MOST_EFFECTS = 4
 _LEAST = 0.1
 #: Of so many effects, the likeliest, is each asked with a second one beside it, or in the place of two.
 _FIRST = 3
+#: A joint's friction, each of which is sought beside those before it.
+_FRICTION = ("coulomb_friction", "viscous_friction", "stribeck_friction")
 #: What depends on one another is found, or designed, in turn so many times.
 ROUNDS = 2
 
@@ -82,7 +84,9 @@ class _Search:
         while True:
             best, others = max(self._steps(found), key=lambda step: step[0], default=(value, found))
             if best <= value + _LEAST:
-                further = chain(self._pairs(found, value), self._exchanges(found, value))
+                further = chain(
+                    self._pairs(found, value), self._exchanges(found, value), self._whole_friction(found)
+                )
                 best, others = max(further, key=lambda step: step[0], default=(value, found))
             if best <= value + _LEAST:
                 break
@@ -186,6 +190,24 @@ class _Search:
             joint = pair[0].effect.joint
             if joint is not None and joint == pair[1].effect.joint:
                 yield from self._two_for(found, pair, (joint - 1,), value)
+
+    def _whole_friction(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
+        """Sets with a joint's Coulomb, viscous and Stribeck friction, Eq. (34), in the place of what rubs there.
+
+        Laws of friction are nearly alike: one that lies between two is found before either, and neither is worth it then
+        without the third.
+        """
+        for joint in dict.fromkeys(f.effect.joint for f in found if f.effect.rubs):
+            every = [f for f in found if not (f.effect.rubs and f.effect.joint == joint)]
+            score = None
+            for one in (effect(name, joint) for name in _FRICTION):
+                trial = None if one.place in self.barred else self._known(every).trial(one)
+                if trial is None:
+                    break
+                score, every = trial.score, [*every, Found(one, trial.shapes[-1], 0.0)]
+            else:
+                if score is not None and len(_kinds(every)) <= self.most:
+                    yield log_posterior(self.evidence, score, [f.effect for f in every]), every
 
     def _two_for(
         self, found: list[Found], some: Sequence[Found], joints: Sequence[int], value: float

@@ -220,14 +220,17 @@ def _best_shape(known: Known, effect: Effect, grid: _Grid) -> Shape:
 
     Chosen on all blocks for the parameters, and without each fold in turn for judging that fold: on the other
     blocks, and on what the known effects leave there when they, too, are fitted without that fold. What lies between
-    (:meth:`Effect.between`) takes the place of the best where it is clearly better.
+    (:meth:`Effect.between`) takes the place of the best where it is clearly better, and none that of the usual one where
+    none is: that is chosen by nothing that judges.
     """
-    folds = (None, *range(FOLDS))
+    folds, blocks = (None, *range(FOLDS)), len(np.unique(known.evidence.blocks))
+    usual = effect.usual(known.evidence.context)
+    if usual is not None and usual in grid.shapes and grid.better(None, usual, grid.shapes, blocks) == usual:
+        return Shape.fixed(usual)
     chosen = [grid.best(without) for without in folds]
     around = {shape: list(effect.between(known.evidence.context, shape)) for shape in set(chosen)}
     if any(around.values()):
         finer = _Grid.of(known, effect, sorted({*around, *chain(*around.values())}))
-        blocks = len(np.unique(known.evidence.blocks))
         each = zip(folds, chosen, strict=True)
         chosen = [finer.better(without, shape, around[shape], blocks) for without, shape in each]
     return Shape(chosen[0], tuple(chosen[1:]))

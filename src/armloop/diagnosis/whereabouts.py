@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +10,8 @@ import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit
-from armloop.diagnosis.judgement import MOSTLY, NEARLY_ALL
+from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY_ALL
+from armloop.diagnosis.outcomes import Outcome
 from armloop.util.arrays import TINY, Array, Index, Mask
 
 
@@ -60,6 +62,22 @@ def whereabouts(evidence: Evidence, fit: Fit, joint: int) -> Whereabouts:
         halves[best][0] if named else "",
         shares[best],
     )
+
+
+def localised(evidence: Evidence, outcome: Outcome, left: Sequence[float], known: Sequence[int]) -> list[str]:
+    """A sentence on each joint of which nearly all of a multiple of the baseline is found under one condition of the motion.
+
+    Args:
+        left: RMSE of what the outcome leaves per joint, N·m (N); NaN where a joint did not move.
+        known: joints (1-based) of which that is told otherwise.
+    """
+    much = [j for j, x in enumerate(left) if x >= MULTIPLE * evidence.scale[j] and j + 1 not in known]
+    found = [(j, whereabouts(evidence, outcome.after, j)) for j in much]
+    return [
+        f"joint {j + 1}: {100 * where.share:.0f} % of what is left there is found where {where.condition}"
+        for j, where in found
+        if where.condition
+    ]
 
 
 def _halves(evidence: Evidence, rows: Index, joint: int) -> list[tuple[str, Mask]]:

@@ -16,7 +16,7 @@ from armloop.dynamics import ModelEquations, coefficients, training_range, visco
 from armloop.dynamics.consistent import ConsistentInertia, consistent_inertia
 from armloop.features.rigid_body import full_columns
 from armloop.laws.effects.base import number
-from armloop.laws.effects.gravity_tilt import tilted_gravity, with_first_moment
+from armloop.laws.effects.gravity_tilt import of_what_leans, tilted_gravity, weightless
 from armloop.laws.effects.payload import link_parameters
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
@@ -101,7 +101,9 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
             rotors[joint] += number(p["inertia"])
         elif name == "gravity_tilt":
             gravity = tilted_gravity(gravity, number(p["roll"]), number(p["pitch"]))
-            links = with_first_moment(arm, links, p)
+            links = of_what_leans(arm, links, p)
+            for slide, mass in weightless(arm, p).items():
+                rotors[slide] += mass
         elif name == "joint_spring":
             k, q0 = number(p["stiffness"]), number(p["rest"])
             total = stiffness[joint] + k
@@ -179,12 +181,15 @@ def rigid_parameters(model: ReconstructedModel, constants: Array) -> tuple[Array
 
 
 def random_motion(model: ReconstructedModel, samples: int, seed: int) -> Motion:
-    """Random states within the range that the model was fitted on; no joint stands still."""
+    """Random states within the range that the model was fitted on, as many slow ones in each octave of the speed as fast.
+
+    Dry friction falls with the speed while a joint is slow; no joint stands still.
+    """
     n, rng = model.arm.n, np.random.default_rng(seed)
     lower, upper = training_range(model)
     size = model.ranges
     q = rng.uniform(lower, upper, (samples, n))
-    v = rng.uniform(0.05, 1.0, q.shape) * rng.choice([-1.0, 1.0], q.shape) * size[1]
+    v = _SLOWEST ** rng.uniform(0.0, 1.0, q.shape) * rng.choice([-1.0, 1.0], q.shape) * size[1]
     vdot = rng.uniform(-1.0, 1.0, q.shape) * size[2]
     return Motion(np.arange(float(samples)), q, v, vdot)
 
@@ -239,6 +244,8 @@ def friction_torques(model: ReconstructedModel) -> tuple[Array, Array]:
 
 
 _WARM = 1e300
+#: Slowest of these states, in parts of the largest trained speed.
+_SLOWEST = 0.02
 _WORDS = {
     "smooth_sign": "dry friction that sets in smoothly",
     "hysteresis": "memory (presliding)",

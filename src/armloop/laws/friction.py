@@ -355,6 +355,11 @@ class FrictionLaw:
         """Whether the dry friction of a joint (0-based) is there with the path since it turned round, or with its speed."""
         return self.remembers(joint) or self.fading(joint) > 0
 
+    def stribeck_velocity(self, joint: int) -> float:
+        """The velocity at which a joint's (0-based) dry friction falls, rad/s (m/s); 0 where it has none, or several."""
+        fall = stribeck_term(self.terms[joint])
+        return 0.0 if fall is None else fall.parameter
+
     def fading(self, joint: int) -> float:
         """Least speed over which a direction of the dry friction of a joint (0-based) fades in; 0 where it turns at once."""
         dry = [

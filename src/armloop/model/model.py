@@ -171,9 +171,18 @@ class ReconstructedModel:
 
     def _bare_context(self, motion: Motion, effects: Sequence[Effect]) -> Context:
         inertial = self.carried_parameters() if any(e.needs_inertial for e in effects) else None
-        fading = tuple(map(self.friction.fading, range(self.arm.n)))
+        fading, falls = (
+            tuple(map(of, range(self.arm.n)))
+            for of in (self.friction.fading, self.friction.stribeck_velocity)
+        )
         return Context(
-            self.arm, motion, inertial, motion.period, fading=fading, ripples=ripples(self.effects)
+            self.arm,
+            motion,
+            inertial,
+            motion.period,
+            fading=fading,
+            falls=falls,
+            ripples=ripples(self.effects),
         )
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:

@@ -9,13 +9,20 @@ import numpy as np
 from armloop.diagnosis.pushes import FEW
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.laws.effects.time_delay import TimeDelay
+from armloop.laws.effects.torque_gain import TorqueGain
 from armloop.reports.prose import Prose
 from armloop.reports.words import counted, effect_label, from_to, listed, percent, place, unit
 from armloop.reports.words import joints as of_joints
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from armloop.diagnosis import Diagnosis
+    from armloop.laws.effects import Effect
     from armloop.model import AddedEffect
+
+#: Shares that add up to less than this part of what all effects remove are told as parts of a whole.
+_MOSTLY = 0.8
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -38,6 +45,7 @@ def findings(diagnosis: Diagnosis) -> list[str]:
             (unit(added.sentence()), found, found in turned)
             for found, added in zip(outcome.found, outcome.added(), strict=True)
         ],
+        "together": _together(diagnosis),
         "contacts": diagnosis.contacts,
         "events": _events(diagnosis),
         "toolless": _toolless(diagnosis),
@@ -55,6 +63,14 @@ def findings(diagnosis: Diagnosis) -> list[str]:
         "adopted": diagnosis.adopted,
     }
     return Prose("findings", **values).paragraphs("findings") or [_nothing(diagnosis)]
+
+
+def _together(diagnosis: Diagnosis) -> float | None:
+    """What all effects remove of what can be explained, where that is far more than each does beside the others."""
+    outcome = diagnosis.outcome
+    apart = sum(found.share for found in outcome.found)
+    alike = diagnosis.reversals is None and len(outcome.found) > 1 and apart < _MOSTLY * outcome.together
+    return outcome.together if alike else None
 
 
 def judged_apart(diagnosis: Diagnosis) -> str:
@@ -105,11 +121,20 @@ def blame(diagnosis: Diagnosis) -> list[str]:
     say = Prose(
         "findings",
         who=who[:1].upper() + who[1:],
-        what="recording" if all(isinstance(a.effect, TimeDelay) for a in faulty) else "sensor",
+        what=_at_fault([type(a.effect) for a in faulty]),
         arm=[effect_label(a.effect) for a in added if not a.effect.sensor],
         remedies=[a.remedy() for a in faulty],
     )
     return say.paragraphs("blame")
+
+
+def _at_fault(kinds: Sequence[type[Effect]]) -> str:
+    """What is, where the arm is not."""
+    if {*kinds} == {TimeDelay}:
+        return "recording"
+    return (
+        "sensor" if TorqueGain not in kinds else "sensor, or the motor where the log holds what it was told,"
+    )
 
 
 def confounded(diagnosis: Diagnosis) -> list[tuple[str, list[tuple[str, str]]]]:
@@ -166,6 +191,8 @@ def nothing_to_supply(added: list[AddedEffect]) -> str:
 
 def _why_not(added: AddedEffect) -> str:
     if added.effect.sensor:
+        if isinstance(added.effect, TorqueGain):
+            return "a gain of the sensor is no torque that the arm needs, and one of the motor is to be mended there"
         return "a sensor's fault is no torque that the arm needs"
     if added.effect.event:
         return "what pushed the arm, was carried, or came and went, was an event of this run"

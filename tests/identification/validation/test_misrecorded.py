@@ -114,7 +114,7 @@ def test_single_torques_of_another_sign_or_gain_are_told_by_an_evaluation(
     assert "run: tau2 has the other sign than what the model gives" in capsys.readouterr().err
 
 
-def test_a_log_that_the_model_explains_by_half_is_not_asked_of(
+def test_a_log_that_the_model_mostly_explains_is_not_asked_of(
     model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def asked(*_: object) -> None:
@@ -122,9 +122,10 @@ def test_a_log_that_the_model_explains_by_half_is_not_asked_of(
 
     monkeypatch.setattr(misrecorded_module, "_read_otherwise", asked)
     log = run(5, 12.0)
-    assert said(model, replace(log, tau=1.8 * log.tau)) == ""
+    assert said(model, replace(log, tau=1.3 * log.tau)) == ""
     with pytest.raises(AssertionError):
-        said(model, replace(log, tau=2.2 * log.tau))
+        # wrists are much alike: what two that are exchanged leave may be a third
+        said(model, replace(log, tau=1.55 * log.tau))
 
 
 def test_every_reading_is_asked_of_once(model: ReconstructedModel) -> None:

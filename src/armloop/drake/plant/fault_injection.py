@@ -138,9 +138,9 @@ def realise(arm: Arm, effects: Effects) -> Realisation:
             ball = p.get("own_inertia")
             made.payloads.append((float(p["mass"]), com, None if ball is None else float(ball)))
         elif isinstance(kind, GravityTilt):
-            if np.any(p.get("first_moment", 0.0)):
+            if np.any(p.get("first_moment", 0.0)) or np.any(p.get("weightless", 0.0)):
                 raise ScenarioError(
-                    "effect gravity_tilt: first_moment is what models lack; the plant's links have it: leave it out"
+                    "effect gravity_tilt: first_moment and weightless are what models lack; the plant has it: leave them out"
                 )
             made.R_WB = made.R_WB @ base_rotation(number(p["roll"]), number(p["pitch"]))
         elif isinstance(kind, ExternalContact):

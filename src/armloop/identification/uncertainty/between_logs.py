@@ -279,7 +279,7 @@ def notes(model: ReconstructedModel) -> list[str]:
             level, slope = np.sqrt(np.maximum(np.diag(T), 0.0))
             found.append(
                 f"joint {j + 1}: friction differs between the logs by more than chance, by a standard deviation of "
-                f"{level:.2g} {unit} (dry) and {slope:.2g} {slope_unit} (viscous), as it does where a drive warms up: "
-                "what a later run shows of it is weighed by that"
+                f"{level:.2g} {unit} (dry) and {slope:.2g} {slope_unit} (viscous), as where a drive warms up, or "
+                "where its law is not quite the model's and logs differ in speed: what a later run shows is weighed by that"
             )
     return found

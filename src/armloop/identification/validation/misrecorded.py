@@ -27,7 +27,7 @@ from armloop.util.errors import InputError
 
 #: A joint's relative error from which on a log is asked, and the part of each joint's, at most, that what it may mean must
 #: leave of it, but for what the model leaves on its own data as well: two columns that are exchanged leave others as good.
-POOR, _BETTER = 0.5, 0.3
+POOR, _BETTER = 0.3, 0.3
 #: Instants at which readings are compared, and how many that do best are asked of all samples.
 _SCREENED, _VERIFIED = 2000, 3
 #: A factor of all torques is far from one, or negative; one of minus one, to this ratio, is a sign.

@@ -44,8 +44,7 @@ class Parameter:
         unit: with TAU, POS and INERTIA to be filled in for a joint.
         least: smallest value of the whole effect, as a simulated arm may have it; ``above``: it must be larger.
         positive: whether also what is found in addition to a model must be above zero.
-        size: 3 for a vector.
-        default: value where none is given; None where it must be.
+        size: 3 for a vector; default: value where none is given, None where it must be.
         shape: whether it is the law's nonlinear parameter: "continuous" is refined between the values tried,
             "chosen" is one of them.
     """
@@ -117,6 +116,7 @@ class Context:
         predicted: (N, n) the same on this motion, with the sensor faults that come before.
         fading: per joint the speed, rad/s (m/s), over which the direction of the known model's dry friction fades in;
             empty or 0 where it turns at once.
+        falls: per joint the Stribeck velocity of the known model's friction, rad/s (m/s); empty or 0 where it has none.
         ripples: orders of the known model's torque ripples by their joints (1-based).
     """
 
@@ -128,6 +128,7 @@ class Context:
     predict: Callable[[Motion], Array] | None = None
     predicted: Array | None = None
     fading: tuple[float, ...] = ()
+    falls: tuple[float, ...] = ()
     ripples: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
 
     @cached_property
@@ -159,28 +160,25 @@ class Effect(ABC):
         name: as in ``diagnosis.json``.
         scope: "arm", "joint" or "pair"; ``joint_wise`` and ``pair_wise`` follow from it.
         role: "mechanical"; "sensor", which falsifies what is recorded instead of acting on the arm; or "event" of one
-            run, which no controller supplies. ``sensor`` and ``event`` follow from it, and that no event is ``searched``:
-            a hypothesis of a diagnosis.
+            run, which no controller supplies nor a diagnosis searches. ``sensor``, ``event``, ``searched`` follow from it.
         parameters: what it calls its numbers; as many are free (``complexity``) unless it says otherwise.
         built_in: whether an arm may be built with it, so that it is sought in training data, if it is not ``searched``.
-        beside: names of laws beside one of which, at the same joint, it is sought in training data, and there alone.
+        beside: names of the laws beside which alone, at their joints, it is sought in training data.
         needs_inertial: whether its columns are made of the known model's inertial parameters.
         needs_model: whether its columns depend on anything the known model says, not on the motion alone.
         mesh: columns of a nonlinear parameter between multiples of this may be interpolated; None where they may not.
         load: whether its torque passes the joint's bearings and gears, so that friction grows with it.
         memory: whether it depends on the path or the time, not only on q, v and vdot.
-        of_time: whether it depends on the time since the start of a run; to a controller the start is long ago.
-        watched: whether a watch of an arm in operation keeps its columns: not where they are nothing over much of a
-            motion, or too many to be kept of every pair of joints.
-        simulated: whether Drake's systems can have it; else it is found in logs alone.
-        passive: whether each of its coefficients is an inertia, or dissipates on its own, so that it is negative for no arm.
+        of_time: whether on the time since a run's start, which to a controller is long ago.
+        watched: whether a watch keeps its columns: not where they are nothing over much of a motion, or too many.
+        simulated: whether Drake's systems can have it.
+        passive: whether each of its coefficients is an inertia, or dissipates on its own: it is negative for no arm.
         rubs: whether it is friction of one joint and nothing else, as the friction selection of a reconstruction has it.
         periodic: whether its shape is a number of cycles per revolution of its joint.
-        fault_order: of sensors: a record is falsified by the lower ones first.
-        nested: how many of its free parameters, the last, are all of another listed law, or nothing without the others: it
-            is there if the others are.
+        fault_order: a record is falsified by the lower ones first.
+        nested: how many of its free parameters, the last, are another listed law by themselves, or nothing without the rest.
         alike: why another effect, by its name, can look the same on one motion, and which motion tells them apart.
-        looks_like: the name of an effect whose likenesses it shares.
+        looks_like: an effect whose likenesses it shares.
     """
 
     name: ClassVar[str]
@@ -270,6 +268,10 @@ class Effect(ABC):
         """Values of the nonlinear parameter to try; one dummy value where there is none."""
         return (0.0,)
 
+    def usual(self, context: Context) -> float | None:
+        """That of :meth:`shapes` which it has unless another leaves clearly less, if any."""
+        return None
+
     def between(self, context: Context, shape: float) -> Sequence[float]:
         """Values around one of :meth:`shapes` that it stands for unless a run tells them apart; none by default."""
         return ()
@@ -291,12 +293,12 @@ class Effect(ABC):
         return beta
 
     def embed(self, x: Array) -> tuple[Array, Array]:
-        """Coefficients (p,) of free parameters x (k,), and their derivative (p, k); the identity by default.
-
-        An effect whose coefficients obey physical laws among themselves (a body's mass, centre and
-        inertia) states them here.
-        """
+        """Coefficients (p,) of free parameters x (k,), and their derivative (p, k), where physical laws tie coefficients."""
         return x, np.eye(len(x))
+
+    def alone(self, x: Array) -> slice:
+        """Those of free parameters (k,) that are not ``nested``."""
+        return slice(len(x) - self.nested)
 
     def judged(self, x: Array) -> tuple[Array, Array]:
         """Coefficients (p,) by which a diagnosis judges free parameters x (k,), and their derivative (p, k)."""

@@ -80,12 +80,16 @@ class Law(Effect):
         shape = cls._shape()
         return shape is not None and shape.shape == "continuous"
 
+    def _follows(self, x: Array) -> bool:
+        """Whether one of the coefficients (k,) is of de/dlog s."""
+        return self._profiled() and len(x) > len(self.elements)
+
     def coefficients(self, p: Mapping[str, float]) -> tuple[float, ...]:
         """The elements' coefficients of given parameters: these themselves in their order, but for the shape."""
         return tuple(p[q.name] for q in self.parameters if not q.shape)
 
     def named(self, x: Array, shape: float) -> tuple[float, ...]:
-        values = iter(x.tolist() if not self._profiled() else np.delete(x, 1).tolist())
+        values = iter(np.delete(x, 1).tolist() if self._follows(x) else x.tolist())
         value = self.refined(x, shape) if self._profiled() else shape
         return tuple(value if p.shape else next(values) for p in self.parameters)
 
@@ -132,7 +136,7 @@ class Law(Effect):
         Farther off, e and de/dlog s together are the law at no s: what they happen to span would be judged in its name.
         """
         given, slope = super().judged(x)
-        if self._profiled() and abs(x[1]) > self._FARTHEST * abs(x[0]):
+        if self._follows(x) and abs(x[1]) > self._FARTHEST * abs(x[0]):
             ratio = self._FARTHEST * np.sign(x[0] * x[1])
             given = given.copy()
             given[1] = ratio * x[0]
@@ -140,7 +144,7 @@ class Law(Effect):
         return given, slope
 
     def refined(self, x: Array, shape: float) -> float:
-        if not self._profiled():
+        if not self._follows(x):
             return shape
         size = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
         return self._moved(shape, float(np.clip(x[1] / size, -self._FARTHEST, self._FARTHEST)))
@@ -151,8 +155,9 @@ class Law(Effect):
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         found, own = super().estimates(arm, x, covariance, shape), self._shape()
-        if own is not None and self._profiled() and abs(x[1]) >= self._FARTHEST * abs(x[0]):
-            # held where the first order ends: by how much it is off nobody knows
+        held = not self._follows(x) or abs(x[1]) >= self._FARTHEST * abs(x[0])
+        if own is not None and self._profiled() and held:
+            # as given, or where the first order ends: by how much it is off nobody knows
             found[own.name] = replace(found[own.name], std_error=np.nan)
         return found
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.laws.effects.base import Context, Parameter
+from armloop.laws.effects.base import Array, Context, Parameter
 from armloop.laws.effects.law import Law
 
 
@@ -28,4 +28,15 @@ class StribeckFriction(Law):
         # fall where the known friction has not turned yet: friction that turns faster than the model says looks like one.
         fading = context.fading[self.index] if context.fading else 0.0
         low, high = max(float(slowest), 1e-3 * float(fastest), fading), float(fastest)
-        return [] if high <= low else [float(v) for v in np.geomspace(low, high, 16)]
+        if high <= low:
+            return []
+        known = [v for v in (self.usual(context),) if v is not None and low < v < high]
+        return sorted([*np.geomspace(low, high, 16).tolist(), *known])
+
+    def usual(self, context: Context) -> float | None:
+        """The velocity at which the known friction falls: what has grown falls there, and few samples are so slow."""
+        return context.falls[self.index] or None if context.falls else None
+
+    def columns(self, context: Context, shape: float) -> Array:
+        own = super().columns(context, shape)
+        return own[:, :1] if shape == self.usual(context) else own

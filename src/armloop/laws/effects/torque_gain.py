@@ -9,7 +9,10 @@ from armloop.robot.arm import Arm
 
 
 class TorqueGain(Effect):
-    """recorded tau_j = g true tau_j: a fault of the sensor (or of the drive gain that turned a current into it)."""
+    """recorded tau_j = g true tau_j: a fault of the sensor, or of the drive gain that turned a current into it.
+
+    Of torques that were commanded it is a motor that gives 1/g of what it is told.
+    """
 
     name = "torque_gain"
     role = "sensor"
@@ -44,14 +47,15 @@ class TorqueGain(Effect):
         e = parameters["gain"]
         turned = ", its sign is turned" if number(e.value) < 0 else ""
         return (
-            f"the torque reading of joint {self.joint} is {e.words()} times the true torque{turned}: the sensor, not the "
-            "arm"
+            f"the torque reading of joint {self.joint} is {e.words()} times the true torque{turned}: the sensor, or the "
+            "motor where the log holds what it was told, not the arm"
         )
 
     def remedy(self, parameters: dict[str, Estimate]) -> str:
         gain = number(parameters["gain"].value)
         return (
             f"Divide the torque readings of joint {self.joint} by {gain:.4g}, or correct the drive gain that turns its "
-            "current into torque. The feedforward stays as it is, unless the drive turns commands into current by the "
-            f"same wrong gain: then the joint receives {1 / gain:.3g} times what it is told, until that gain is corrected"
+            "current into torque; the feedforward stays as it is, if they were measured. If they are what the drive was "
+            f"told, its motor gives {1 / gain:.3g} times that, as one does that has become weaker: multiply the feedforward "
+            f"of joint {self.joint} by {gain:.4g} until it is mended"
         )
