@@ -20,7 +20,7 @@ def run(options: Evaluate) -> None:
     from armloop.data.repeats import require_different
     from armloop.data.signals import preprocess
     from armloop.identification.scoring import of_slow_motion, score
-    from armloop.reports.tables import ALL_COUNT, score_table
+    from armloop.reports.tables import ALL_COUNT, score_by_log, score_table
     from armloop.reports.words import wrapped
     from armloop.robot.plausibility import say_implausible
 
@@ -33,9 +33,15 @@ def run(options: Evaluate) -> None:
     samples = preprocess(logs, model.conditioning)
     say_misrecorded(model, samples, [log.name for log in logs])
     result = score(model, samples)
+    # of several logs one may be of an arm that has changed
+    apart = logs if len(logs) > 1 else []
+    each = {log.name: score(model, preprocess([log], model.conditioning)) for log in apart}
     if options.json:
-        print_json(result.to_dict())
+        by_log = [{"log": name, **one.to_dict()} for name, one in each.items()]
+        print_json({**result.to_dict(), **({"logs": by_log} if each else {})})
         return
     print(score_table(result, model.arm, units=model.torque_units), wrapped(ALL_COUNT), sep="\n")
+    if each:
+        print("", score_by_log(each, model.arm), sep="\n")
     for words in of_slow_motion(model, samples):
         print(wrapped(f"note: {words}"))

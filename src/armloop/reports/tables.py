@@ -238,6 +238,13 @@ def score_table(
     return make_table(headers, rows, title, left=(0, 1))
 
 
+def score_by_log(scores: Mapping[str, Score], arm: Arm) -> Table:
+    """nRMSE of the moving joints, log by log."""
+    rows = [[name, *map(percent, score.moving["nrmse"])] for name, score in scores.items()]
+    headers = ["log", *(f"{j + 1}  {joint.name}" for j, joint in enumerate(arm.joints))]
+    return make_table(headers, rows, "nRMSE moving, by log", left=(0,))
+
+
 #: What :func:`score_table` counts of a log, beside what a diagnosis judges of the same.
 ALL_COUNT = (
     "Every sample of a joint that moves counts. A diagnosis, which leaves out the ends of a run, events, and what lies far "

@@ -19,6 +19,17 @@ class ErrorsData(Struct):
     nrmse: PerJointOrNull
 
 
+class LogEvaluationData(Struct):
+    """The same of one log of several."""
+
+    log: Text
+    rmse: PerJointOrNull
+    nrmse: PerJointOrNull
+    moving: ErrorsData
+    standstill: ErrorsData
+    samples: Count
+
+
 class EvaluationData(Struct):
     """`armloop evaluate --json`: errors of a model's torques, over all samples, those that move, and those at rest."""
 
@@ -27,6 +38,7 @@ class EvaluationData(Struct):
     moving: ErrorsData
     standstill: ErrorsData
     samples: Count
+    logs: list[LogEvaluationData] | UnsetType = UNSET
 
 
 class StepData(Struct):
