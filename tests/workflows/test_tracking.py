@@ -38,7 +38,9 @@ def test_rotors_of_the_plant_are_in_its_closed_loop_and_a_model_without_a_word_a
     geared = replace(usual.plant, config=config)
     scenario = replace(usual, controllers=("exact",), reference=short, score=(0.1, 2.0), plant=geared)
     model = exact_model(geared.arm, config.friction)
-    with pytest.warns(InputWarning, match=r"a URDF states no rotors|is another than the model's"):
+    with pytest.warns(
+        InputWarning, match=r"its rotors are those that the scenario states|is another than the model's"
+    ):
         _, results = run_scenario(scenario, {"step3": model}, None, silent)
     own, links = (results[name].eta.max() for name in ("exact", "pid_step3"))
     assert own < 0.1 * links

@@ -51,7 +51,8 @@ def other_inertia(model: ReconstructedModel, plant: Plant, q0: ArrayLike, effect
     # links of other joints that the model has a little lighter than the URDF are no matter of rotors
     stated = ", ".join(f"{max(x, 0.0):.3g}" for x in rotors)
     return (
-        f"{said}; a URDF states no rotors: with own_plant: {{rotor_inertia: [{stated}]}} it has the model's"
+        f"{said}; its rotors are those that the scenario states: with own_plant: {{rotor_inertia: [{stated}]}} it has the "
+        "model's"
     )
 
 
