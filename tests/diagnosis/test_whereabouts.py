@@ -14,7 +14,7 @@ from armloop.data.signals import preprocess
 from armloop.diagnosis import whereabouts as places
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
-from armloop.diagnosis.whereabouts import Whereabouts, whereabouts
+from armloop.diagnosis.whereabouts import Whereabouts, localised, whereabouts
 from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
@@ -114,3 +114,25 @@ def test_the_words_name_both() -> None:
     words = "nearly all of it is found from 3.0 to 9.5 s, 93 % of it where joint 2 carries more than 5 N*m"
     assert where.words() == words
     assert replace(where, time=None).words().startswith("it is found all over the run, 93 % of it")
+
+
+def of_ten_rows(monkeypatch: pytest.MonkeyPatch, conditions: list[tuple[str, list[int]]]) -> tuple[Any, Any]:
+    """Evidence and an outcome that leaves as much on each of ten rows of joint 2, in each its own block."""
+    masks = [(words, np.isin(np.arange(10), rows)) for words, rows in conditions]
+    monkeypatch.setattr(places, "_halves", lambda evidence, rows, joint: masks)
+    motion = SimpleNamespace(time=np.arange(10.0))
+    rows = np.repeat([[False, True, False]], 10, axis=0)
+    evidence = SimpleNamespace(rows=rows, samples=SimpleNamespace(motion=motion), scale=np.full(3, 0.5))
+    stacked = SimpleNamespace(joint=np.ones(10), block=np.arange(10))
+    return evidence, SimpleNamespace(after=SimpleNamespace(held_out=np.full(10, 2.0), stacked=stacked))
+
+
+def test_of_a_multiple_of_the_baseline_it_is_said_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = ("joint 2 moves slower than 0.2 rad/s", list(range(9)))
+    evidence, outcome = of_ten_rows(monkeypatch, [slow])
+    said = ["joint 2: 90 % of what is left there is found where joint 2 moves slower than 0.2 rad/s"]
+    assert localised(evidence, outcome, [np.nan, 1.0, 0.0], []) == said
+    assert localised(evidence, outcome, [np.nan, 0.99, 0.0], []) == []
+    assert localised(evidence, outcome, [np.nan, 1.0, 0.0], [2]) == []
+    evidence, outcome = of_ten_rows(monkeypatch, [(slow[0], [0, 1, 2])])
+    assert localised(evidence, outcome, [np.nan, 1.0, 0.0], []) == []
