@@ -19,6 +19,7 @@ from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.friction_of_the_day import of_no_other_day, of_that_day, of_the_day, says_more
+from armloop.diagnosis.growth import of_growth
 from armloop.diagnosis.homogeneity import are_unlike, as_modelled, is_contradicted, leaves_much, names_of
 from armloop.diagnosis.judgement import CHANCE
 from armloop.diagnosis.onset import account_with_onsets
@@ -296,7 +297,7 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
         ]
     doubted += [*of_the_temperature(model, outcome.added()), *of_too_few_logs(model, outcome.found)]
     doubted += [*of_a_constant_pull(model, outcome.added()), *of_a_balancer(model, laws)]
-    doubted += of_an_efficiency(outcome.added())
+    doubted += [*of_an_efficiency(outcome.added()), *of_growth(model, outcome.added())]
     said = [*doubted, *stand.reasons, *localised(evidence, fitted, found.errors()["after"], known)]
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=said))
