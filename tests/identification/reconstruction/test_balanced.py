@@ -63,9 +63,10 @@ def test_its_parameters_are_the_harmonics_of_its_column() -> None:
     assert "4.00 ± 0.10 N*m twice and" in words and "part of the first moments" in words
 
 
-def test_a_slide_has_none() -> None:
+@pytest.mark.parametrize("name", ["spring_balancer", "counterbalance"])
+def test_a_slide_has_none(name: str) -> None:
     arm = load_arm("scara")
     q = np.zeros((2, arm.n))
     context = Context(arm, Motion(np.arange(2.0), q, q, q, np.array([0])))
-    shapes = [len(effect("spring_balancer", j + 1).shapes(context)) for j in range(arm.n)]
+    shapes = [len(effect(name, j + 1).shapes(context)) for j in range(arm.n)]
     assert shapes == [int(turns) for turns in arm.revolute]

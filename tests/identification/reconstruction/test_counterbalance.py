@@ -144,11 +144,3 @@ def test_its_parameters_are_those_of_its_columns() -> None:
     assert values["amplitude"] == pytest.approx(5.0) and found["amplitude"].std_error == pytest.approx(0.1)
     words = LAW.sentence({**found, "amplitude": Estimate(5.0, 0.1, "N*m")})
     assert "5.00 ± 0.10 N*m" in words and "no part of the first moments" in words
-
-
-def test_a_slide_has_none() -> None:
-    arm = load_arm("scara")
-    q = np.zeros((2, arm.n))
-    context = Context(arm, Motion(np.arange(2.0), q, q, q, np.array([0])))
-    shapes = [len(effect("counterbalance", j + 1).shapes(context)) for j in range(arm.n)]
-    assert shapes == [int(turns) for turns in arm.revolute]
