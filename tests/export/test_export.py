@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from answers import answered
+from chains import RAIL, arm_of
 from exact_parts import ARMS, disguised, energies, model_of, rigid_body, scara_terms
 
 from armloop.cli import main
@@ -95,6 +96,14 @@ def test_a_tilt_reads_back_with_the_first_moment_that_a_level_arm_hides(tmp_path
         model = model_of(ARMS[name], disguised(ARMS[name], rotors), friction=PLAIN, effects=(tilt,))
         found = export(model, "mjcf", tmp_path / "arm")
         assert found.unsaid is not None and (found.unsaid < 1e-6 * found.rms).all()
+
+
+def test_a_tilt_of_an_arm_on_a_rail_reads_back_with_what_of_it_has_no_weight(tmp_path):
+    pytest.importorskip("mujoco")
+    tilt = ("gravity_tilt", None, {"roll": 0.03, "pitch": -0.02, "weightless": [1.5, 0.0, 0.0]})
+    model = model_of(arm_of(tmp_path, *RAIL), friction=PLAIN, effects=(tilt,))
+    found = export(model, "mjcf", tmp_path / "arm")
+    assert found.unsaid is not None and (found.unsaid < 1e-6 * found.rms).all()
 
 
 @pytest.mark.parametrize("down", [(-0.05, 0.03, -1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
