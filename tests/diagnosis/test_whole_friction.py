@@ -124,9 +124,7 @@ def test_a_known_fall_is_the_usual_one() -> None:
     motion = from_point_to_point(3)
     known: Any = SimpleNamespace(motion=motion, load=None, fading=(), falls=(0.0, 0.1, 0.0))
     unknown: Any = SimpleNamespace(motion=motion, load=None, fading=(), falls=(0.0, 0.0, 0.0))
-    assert law.usual(known) == 0.1 and law.shapes(known) == sorted([*law.shapes(unknown), 0.1])
-    assert law.usual(unknown) is None and len(law.shapes(unknown)) == 16
+    assert law.usual(known) == 0.1 and law.usual(unknown) is None
+    assert law.shapes(known) == law.shapes(unknown)
     # there it has no derivative: of few slow samples any velocity nearby could be made to fit
     assert law.columns(known, 0.1).shape[1] == 1 and law.columns(known, 0.2).shape[1] == 2
-    # one that this run is never as slow as, or as fast as, is none that it shows
-    assert len(law.shapes(SimpleNamespace(motion=motion, load=None, fading=(), falls=(0.0, 99.0, 0.0)))) == 16

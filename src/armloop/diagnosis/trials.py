@@ -81,6 +81,9 @@ class Known:
         shapes = evidence.tried(effect)
         if not shapes:
             return None
+        usual = effect.usual(evidence.context)
+        if usual is not None and min(shapes) < usual < max(shapes):
+            shapes = tuple(sorted({*shapes, usual}))
         grid = _Grid.of(self, effect, shapes) if len(shapes) > 1 else None
         if least > -np.inf:
             first = grid.first(self, effect) if grid else shapes[0]

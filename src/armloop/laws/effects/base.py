@@ -269,7 +269,7 @@ class Effect(ABC):
         return (0.0,)
 
     def usual(self, context: Context) -> float | None:
-        """That of :meth:`shapes` which it has unless another leaves clearly less, if any."""
+        """The value that it has unless one of :meth:`shapes` leaves clearly less, if any."""
         return None
 
     def between(self, context: Context, shape: float) -> Sequence[float]:

@@ -28,10 +28,7 @@ class StribeckFriction(Law):
         # fall where the known friction has not turned yet: friction that turns faster than the model says looks like one.
         fading = context.fading[self.index] if context.fading else 0.0
         low, high = max(float(slowest), 1e-3 * float(fastest), fading), float(fastest)
-        if high <= low:
-            return []
-        known = [v for v in (self.usual(context),) if v is not None and low < v < high]
-        return sorted([*np.geomspace(low, high, 16).tolist(), *known])
+        return [] if high <= low else [float(v) for v in np.geomspace(low, high, 16)]
 
     def usual(self, context: Context) -> float | None:
         """The velocity at which the known friction falls: what has grown falls there, and few samples are so slow."""
