@@ -13,6 +13,7 @@ from armloop.reports.diagnosis_tables import compensation_tables, found_tables
 from armloop.reports.findings import (
     all_added,
     alternatives,
+    at_fault,
     blame,
     findings,
     headline,
@@ -101,6 +102,7 @@ def diagnosis_report(
         diagnosis=diagnosis,
         name=diagnosis.model.arm.name,
         sensors_alone=found and all(e.sensor for e in found) and not diagnosis.contacts,
+        what=at_fault([type(e) for e in found]),
         model=model,
         found=len(found),
     )

@@ -121,15 +121,15 @@ def blame(diagnosis: Diagnosis) -> list[str]:
     say = Prose(
         "findings",
         who=who[:1].upper() + who[1:],
-        what=_at_fault([type(a.effect) for a in faulty]),
+        what=at_fault([type(a.effect) for a in faulty]),
         arm=[effect_label(a.effect) for a in added if not a.effect.sensor],
         remedies=[a.remedy() for a in faulty],
     )
     return say.paragraphs("blame")
 
 
-def _at_fault(kinds: Sequence[type[Effect]]) -> str:
-    """What is, where the arm is not."""
+def at_fault(kinds: Sequence[type[Effect]]) -> str:
+    """What is at fault where effects of these kinds are no matter of the arm."""
     if {*kinds} == {TimeDelay}:
         return "recording"
     return (
