@@ -120,6 +120,7 @@ class TestTrials:
         effect: Any = SimpleNamespace(
             indices=of.get("indices", (0,)),
             shapes=lambda context: of.get("shapes", [5.0]),
+            usual=lambda context: None,
             possible=lambda arm, parameters, had: of.get("plausible", True),
             resolved=lambda parameters, shapes: of.get("resolved", True),
             estimates=lambda arm, free, spread, value: {},
@@ -139,7 +140,10 @@ class TestTrials:
         rows = np.zeros((4, 2), dtype=bool)
         rows[2, 0] = True
         evidence: Any = SimpleNamespace(
-            rows=rows, tried=lambda effect: effect.shapes(None), model=SimpleNamespace(arm=None)
+            rows=rows,
+            context=None,
+            tried=lambda effect: effect.shapes(None),
+            model=SimpleNamespace(arm=None),
         )
         # what was known before is nothing beside it, and may be of either sign
         other: Any = SimpleNamespace(
@@ -225,7 +229,7 @@ class TestTrials:
             "embed": lambda x: (x, np.eye(len(x))),
             "between": lambda *_: (),
         }
-        effect: Any = SimpleNamespace(indices=(1,), **linear)
+        effect: Any = SimpleNamespace(indices=(1,), usual=lambda context: None, **linear)
         assert best_shape(known, effect, shapes) == Shape(2.0, (3.0, 2.0))
         effect.indices = (0,)
         assert best_shape(known, effect, shapes) == Shape(1.0, (1.0, 1.0))
@@ -257,7 +261,7 @@ class TestTrials:
             indices=(0,),
             start=lambda beta: beta[-1:],
             embed=lambda x: (np.array([1.0, x[0]]), np.array([[0.0], [1.0]])),
-            between=lambda *_: (),
+            **{"between": lambda *_: (), "usual": lambda context: None},
         )
         known = Known(evidence, np.zeros((80, 1)), current)
         assert best_shape(known, effect, [1.0, 2.0]) == Shape(2.0, (2.0, 2.0))
@@ -282,7 +286,7 @@ class TestTrials:
             indices=[0],
             start=lambda beta: beta,
             embed=lambda x: (x, np.eye(len(x))),
-            between=lambda *_: (),
+            **{"between": lambda *_: (), "usual": lambda context: None},
         )
         known = Known(evidence, np.zeros((80, 1)), current)
         assert best_shape(known, effect, [2.0, 1.0]) == Shape(1.0, (1.0, 1.0))
@@ -324,6 +328,7 @@ class TestTrials:
             indices=(0,),
             start=lambda beta: beta,
             embed=lambda x: (x, np.eye(len(x))),
+            usual=lambda context: None,
             between=lambda context, shape: [
                 shape - 0.1,
                 shape + 0.1,

@@ -226,17 +226,26 @@ def _best_shape(known: Known, effect: Effect, grid: _Grid) -> Shape:
     (:meth:`Effect.between`) takes the place of the best where it is clearly better, and none that of the usual one where
     none is: that is chosen by nothing that judges.
     """
-    folds, blocks = (None, *range(FOLDS)), len(np.unique(known.evidence.blocks))
+    folds = (None, *range(FOLDS))
     usual = effect.usual(known.evidence.context)
-    if usual is not None and usual in grid.shapes and grid.better(None, usual, grid.shapes, blocks) == usual:
+    if (
+        usual is not None
+        and usual in grid.shapes
+        and grid.better(None, usual, grid.shapes, _blocks(known)) == usual
+    ):
         return Shape.fixed(usual)
     chosen = [grid.best(without) for without in folds]
     around = {shape: list(effect.between(known.evidence.context, shape)) for shape in set(chosen)}
     if any(around.values()):
         finer = _Grid.of(known, effect, sorted({*around, *chain(*around.values())}))
         each = zip(folds, chosen, strict=True)
-        chosen = [finer.better(without, shape, around[shape], blocks) for without, shape in each]
+        chosen = [finer.better(without, shape, around[shape], _blocks(known)) for without, shape in each]
     return Shape(chosen[0], tuple(chosen[1:]))
+
+
+def _blocks(known: Known) -> int:
+    """How many of a run count as independent."""
+    return len(np.unique(known.evidence.blocks))
 
 
 @dataclass(frozen=True, eq=False)

@@ -140,7 +140,7 @@ def realise(arm: Arm, effects: Effects) -> Realisation:
         elif isinstance(kind, GravityTilt):
             if np.any(p.get("first_moment", 0.0)) or np.any(p.get("weightless", 0.0)):
                 raise ScenarioError(
-                    "effect gravity_tilt: first_moment and weightless are what models lack; the plant has it: leave them out"
+                    "effect gravity_tilt: first_moment and weightless are what models lack, and the plant has: leave it out"
                 )
             made.R_WB = made.R_WB @ base_rotation(number(p["roll"]), number(p["pitch"]))
         elif isinstance(kind, ExternalContact):
