@@ -4,6 +4,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect
 from armloop.reports import findings as findings_module
 from armloop.reports.diagnosis_tables import diagnosis_table, events_table
-from armloop.reports.findings import alternatives, findings, nothing_to_supply
+from armloop.reports.findings import _together, alternatives, findings, nothing_to_supply
 from armloop.reports.tables import (
     eta_table,
     formulas,
@@ -125,6 +126,20 @@ def test_the_largest_residual_is_said_to_be_of_the_joints_that_were_judged(
     monkeypatch.setattr(Diagnosis, "errors", lambda self: {"before": before, "noise_floor": [1.0] * n})
     (some,) = findings(clean)
     assert some.startswith(f"At its largest, of joints 1 and {n}, the residual is 1.5 times the baseline")
+
+
+@pytest.mark.parametrize(
+    ("shares", "together"),
+    [((0.1, 0.2), True), ((0.5, 0.4), False), ((0.1,), False)],
+)
+def test_effects_that_are_alike_are_told_as_parts_of_a_whole(
+    shares: tuple[float, ...], together: bool
+) -> None:
+    outcome = SimpleNamespace(found=[SimpleNamespace(share=share) for share in shares], together=1.0)
+    diagnosis: Any = SimpleNamespace(reversals=None, outcome=outcome)
+    assert _together(diagnosis) == (1.0 if together else None)
+    diagnosis.reversals = "some"
+    assert _together(diagnosis) is None
 
 
 def test_why_a_controller_adds_nothing(loop: SimpleNamespace, clean: Diagnosis) -> None:
