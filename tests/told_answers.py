@@ -103,7 +103,7 @@ class Answers:
         parts["of_too_few_logs"] = lambda model, found: self.given.get("of_too_few_logs", [])
         parts["of_a_constant_pull"] = lambda model, added: self.given.get("of_a_constant_pull", [])
         parts["of_an_efficiency"] = lambda added: self.given.get("of_an_efficiency", [])
-        parts["of_growth"] = lambda model, added: []
+        parts["with_growth"] = lambda model, found: found
         parts["of_a_balancer"] = lambda model, laws: self.given.get("of_a_balancer", [])
         parts["suspected"] = lambda evidence, found, left: self.note(
             "suspected", (evidence.name, found, left), self.given.get("suspected", [])

@@ -251,6 +251,7 @@ def test_friction_is_taken_off_anew_beside_friction_that_was_found(
     monkeypatch.setattr(module, "says_more", lambda found, other: more and other.of == "whole")
     monkeypatch.setattr(module, "of_that_day", lambda model, found, friction: (found.of, friction))
     monkeypatch.setattr(module, "of_no_other_day", lambda found, whole, day: found)
+    monkeypatch.setattr(module, "with_growth", lambda model, found: found)
     model: Any = SimpleNamespace(conditioning=None, arm=None)
     found, account = module._judged(model, [], print, 1)
     assert asked == ([[], added] if rubs else [[]]) and account == "account of whole"

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from armloop.diagnosis.growth import of_growth
+from armloop.diagnosis.growth import of_growth, with_growth
+from armloop.diagnosis.reasons import Standing
+from armloop.diagnosis.verdict import Diagnosis
 from armloop.laws.effects import Estimate, effect
 from armloop.model import AddedEffect
+
+NOTHING: Any = None
+EMPTY = Diagnosis("effects_found", NOTHING, NOTHING, None, NOTHING, [], NOTHING)
 
 
 def added(name: str, joint: int, **values: float) -> AddedEffect:
@@ -20,8 +26,8 @@ def law(**values: float) -> dict[str, Any]:
     return {key: {"value": x, "std_error": 0.01} for key, x in values.items()}
 
 
-def model(stribeck: Any = None, line: Any = None) -> Any:
-    return SimpleNamespace(uncertainty={"stribeck": stribeck, "friction_line": line})
+def model(stribeck: Any = None, line: Any = None, *effects: AddedEffect) -> Any:
+    return SimpleNamespace(uncertainty={"stribeck": stribeck, "friction_line": line}, effects=effects)
 
 
 MORE = [
@@ -56,3 +62,25 @@ def test_other_effects_are_no_growth() -> None:
     assert of_growth(known, [added("torque_offset", 1, offset=1.0)]) == []
     both = of_growth(known, [added("coulomb_friction", 1, level=-1.5), added("torque_offset", 1, offset=1.0)])
     assert both == ["joint 1: dry friction is 0.5 times what the model has"]
+
+
+def test_what_was_found_before_is_part_of_what_the_model_has() -> None:
+    before = (
+        added("coulomb_friction", 2, level=3.0),
+        added("coulomb_friction", 1, level=9.0),
+        AddedEffect(effect("payload", None), {}),
+    )
+    known = model([{}, law(coulomb=3.0, viscous=4.0)], None, *before)
+    assert of_growth(known, MORE[:1]) == ["joint 2: dry friction is 1.5 times what the model has"]
+
+
+def test_a_verdict_says_it_last() -> None:
+    standing = Standing(["a reason"], [], False)
+    outcome = SimpleNamespace(added=lambda: MORE[:1])
+    found: Any = replace(EMPTY, outcome=outcome, standing=standing)
+    known = model([{}, law(coulomb=3.0)])
+    assert with_growth(known, found).standing.reasons == [
+        "a reason",
+        "joint 2: dry friction is 2 times what the model has",
+    ]
+    assert with_growth(model(), found) is found

@@ -35,9 +35,9 @@ def run(options: Evaluate) -> None:
     result = score(model, samples)
     # of several logs one may be of an arm that has changed
     apart = logs if len(logs) > 1 else []
-    each = {log.name: score(model, preprocess([log], model.conditioning)) for log in apart}
+    each = [(log.name, score(model, preprocess([log], model.conditioning))) for log in apart]
     if options.json:
-        by_log = [{"log": name, **one.to_dict()} for name, one in each.items()]
+        by_log = [{"log": name, **one.to_dict()} for name, one in each]
         print_json({**result.to_dict(), **({"logs": by_log} if each else {})})
         return
     print(score_table(result, model.arm, units=model.torque_units), wrapped(ALL_COUNT), sep="\n")

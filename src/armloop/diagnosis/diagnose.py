@@ -19,7 +19,7 @@ from armloop.diagnosis.event_significance import drowned, told
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.friction_of_the_day import of_no_other_day, of_that_day, of_the_day, says_more
-from armloop.diagnosis.growth import of_growth
+from armloop.diagnosis.growth import with_growth
 from armloop.diagnosis.homogeneity import are_unlike, as_modelled, is_contradicted, leaves_much, names_of
 from armloop.diagnosis.judgement import CHANCE
 from armloop.diagnosis.onset import account_with_onsets
@@ -145,19 +145,20 @@ def _judged(
     """The verdict on logs of the same circumstances, and the account that it comes from; None where too little moves."""
     whole = Evidence.of(model, preprocess(logs, model.conditioning), hypotheses(model.arm))
     found, account = _verdict(whole, logs, progress, jobs)
-    if account is None or (day := of_the_day(whole)) is None:
-        return found, account
-    progress("whether more is told beside the friction of the day")
-    other, _ = _verdict(day[0], logs, progress, jobs)
-    added = other.outcome.added()
-    if any(one.effect.rubs for one in added) and (again := of_the_day(whole, added)) is not None:
-        # what was found took part in what was taken for friction of the day
-        day = again
+    if account is not None and (day := of_the_day(whole)) is not None:
+        progress("whether more is told beside the friction of the day")
         other, _ = _verdict(day[0], logs, progress, jobs)
-    # accounts of several logs are compared as they are weighed at first
-    if says_more(other, found):
-        return of_that_day(model, other, day[1]), account
-    return of_no_other_day(found, whole, day[0]), account
+        added = other.outcome.added()
+        if any(one.effect.rubs for one in added) and (again := of_the_day(whole, added)) is not None:
+            # what was found took part in what was taken for friction of the day
+            day = again
+            other, _ = _verdict(day[0], logs, progress, jobs)
+        # accounts of several logs are compared as they are weighed at first
+        if says_more(other, found):
+            found = of_that_day(model, other, day[1])
+        else:
+            found = of_no_other_day(found, whole, day[0])
+    return with_growth(model, found), account
 
 
 def _verdict(
@@ -297,7 +298,7 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
         ]
     doubted += [*of_the_temperature(model, outcome.added()), *of_too_few_logs(model, outcome.found)]
     doubted += [*of_a_constant_pull(model, outcome.added()), *of_a_balancer(model, laws)]
-    doubted += [*of_an_efficiency(outcome.added()), *of_growth(model, outcome.added())]
+    doubted += of_an_efficiency(outcome.added())
     said = [*doubted, *stand.reasons, *localised(evidence, fitted, found.errors()["after"], known)]
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=said))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+from armloop.diagnosis.verdict import Diagnosis
 from armloop.laws.effects.base import number
 from armloop.model import AddedEffect, ReconstructedModel
 
@@ -16,21 +18,39 @@ _PARTS = {
 }
 
 
+def with_growth(model: ReconstructedModel, found: Diagnosis) -> Diagnosis:
+    """A verdict with a sentence on each joint whose friction has changed.
+
+    Args:
+        model: as it was made, with what was found in it before.
+    """
+    said = of_growth(model, found.outcome.added())
+    return (
+        replace(found, standing=replace(found.standing, reasons=[*found.standing.reasons, *said]))
+        if said
+        else found
+    )
+
+
 def of_growth(model: ReconstructedModel, added: Sequence[AddedEffect]) -> list[str]:
     """A sentence on each joint whose friction has changed; of parts that the model has, as its uncertainties state them."""
     found = []
     for joint in dict.fromkeys(a.effect.joint for a in added if a.effect.name in _PARTS):
         assert joint is not None
         has = _parts(model, joint - 1)
+        for a in model.effects:
+            if a.effect.joint == joint and a.effect.name in has:
+                has[a.effect.name] += _size(a)
         own = [a for a in added if a.effect.joint == joint and has.get(a.effect.name, 0.0) > 0]
-        times = [
-            f"{what} is {1 + number(a.parameters[key].value) / has[a.effect.name]:.3g} times"
-            for a in own
-            for key, what in (_PARTS[a.effect.name],)
-        ]
+        times = [f"{_PARTS[a.effect.name][1]} is {1 + _size(a) / has[a.effect.name]:.3g} times" for a in own]
         if times:
             found.append(f"joint {joint}: {', '.join(times)} what the model has")
     return found
+
+
+def _size(added: AddedEffect) -> float:
+    """What an effect adds to its part of Eq. (34)."""
+    return number(added.parameters[_PARTS[added.effect.name][0]].value)
 
 
 def _parts(model: ReconstructedModel, j: int) -> dict[str, float]:

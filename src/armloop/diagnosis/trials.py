@@ -81,19 +81,25 @@ class Known:
         shapes = evidence.tried(effect)
         if not shapes:
             return None
-        usual = effect.usual(evidence.context)
-        if usual is not None and min(shapes) < usual < max(shapes):
-            shapes = tuple(sorted({*shapes, usual}))
         grid = _Grid.of(self, effect, shapes) if len(shapes) > 1 else None
         if least > -np.inf:
             first = grid.first(self, effect) if grid else shapes[0]
             if self._at_most(effect, first, 0 if grid else REFINEMENTS) < least - _SLACK:
                 return None
-        shape = _best_shape(self, effect, grid) if grid else Shape.fixed(shapes[0])
-        effects, chosen = [*current.effects, effect], [*current.shapes, shape]
-        trial = fit(evidence, self.residual, effects, chosen, self._columns)
+        usual = effect.usual(evidence.context)
+        chosen = [_best_shape(self, effect, grid) if grid else Shape.fixed(shapes[0])]
+        chosen += [Shape.fixed(usual)] if usual is not None and min(shapes) < usual < max(shapes) else []
+        effects = [*current.effects, effect]
+        trials = [
+            fit(evidence, self.residual, effects, [*current.shapes, shape], self._columns) for shape in chosen
+        ]
         # What is known may be nothing beside it, and of either sign: it is asked again beside this one.
-        return trial if trial.is_possible(-1, shapes) else None
+        possible = [trial for trial in trials if trial.is_possible(-1, shapes)]
+        return (
+            max(possible, key=lambda trial: told(trial.score))
+            if len(possible) > 1
+            else next(iter(possible), None)
+        )
 
     def _at_most(self, effect: Effect, shape: float, refinements: int) -> float:
         """Upper bound of the log posterior odds of an effect beside what is known (branch and bound).
@@ -223,29 +229,17 @@ def _best_shape(known: Known, effect: Effect, grid: _Grid) -> Shape:
 
     Chosen on all blocks for the parameters, and without each fold in turn for judging that fold: on the other
     blocks, and on what the known effects leave there when they, too, are fitted without that fold. What lies between
-    (:meth:`Effect.between`) takes the place of the best where it is clearly better, and none that of the usual one where
-    none is: that is chosen by nothing that judges.
+    (:meth:`Effect.between`) takes the place of the best where it is clearly better.
     """
     folds = (None, *range(FOLDS))
-    usual = effect.usual(known.evidence.context)
-    if (
-        usual is not None
-        and usual in grid.shapes
-        and grid.better(None, usual, grid.shapes, _blocks(known)) == usual
-    ):
-        return Shape.fixed(usual)
     chosen = [grid.best(without) for without in folds]
     around = {shape: list(effect.between(known.evidence.context, shape)) for shape in set(chosen)}
     if any(around.values()):
         finer = _Grid.of(known, effect, sorted({*around, *chain(*around.values())}))
+        blocks = len(np.unique(known.evidence.blocks))
         each = zip(folds, chosen, strict=True)
-        chosen = [finer.better(without, shape, around[shape], _blocks(known)) for without, shape in each]
+        chosen = [finer.better(without, shape, around[shape], blocks) for without, shape in each]
     return Shape(chosen[0], tuple(chosen[1:]))
-
-
-def _blocks(known: Known) -> int:
-    """How many of a run count as independent."""
-    return len(np.unique(known.evidence.blocks))
 
 
 @dataclass(frozen=True, eq=False)

@@ -238,9 +238,9 @@ def score_table(
     return make_table(headers, rows, title, left=(0, 1))
 
 
-def score_by_log(scores: Mapping[str, Score], arm: Arm) -> Table:
+def score_by_log(scores: Sequence[tuple[str, Score]], arm: Arm) -> Table:
     """nRMSE of the moving joints, log by log."""
-    rows = [[name, *map(percent, score.moving["nrmse"])] for name, score in scores.items()]
+    rows = [[name, *map(percent, score.moving["nrmse"])] for name, score in scores]
     headers = ["log", *(f"{j + 1}  {joint.name}" for j, joint in enumerate(arm.joints))]
     return make_table(headers, rows, "nRMSE moving, by log", left=(0,))
 

@@ -19,26 +19,26 @@ class ErrorsData(Struct):
     nrmse: PerJointOrNull
 
 
-class LogEvaluationData(Struct):
-    """The same of one log of several."""
+class ScoreData(Struct):
+    """Errors of a model's torques, over all samples, those that move, and those at rest."""
+
+    rmse: PerJointOrNull
+    nrmse: PerJointOrNull
+    moving: ErrorsData
+    standstill: ErrorsData
+    samples: Count
+
+
+class LogScoreData(ScoreData):
+    """Those of one log of several."""
 
     log: Text
-    rmse: PerJointOrNull
-    nrmse: PerJointOrNull
-    moving: ErrorsData
-    standstill: ErrorsData
-    samples: Count
 
 
-class EvaluationData(Struct):
-    """`armloop evaluate --json`: errors of a model's torques, over all samples, those that move, and those at rest."""
+class EvaluationData(ScoreData):
+    """`armloop evaluate --json`: errors of a model's torques on all logs, and of several on each."""
 
-    rmse: PerJointOrNull
-    nrmse: PerJointOrNull
-    moving: ErrorsData
-    standstill: ErrorsData
-    samples: Count
-    logs: list[LogEvaluationData] | UnsetType = UNSET
+    logs: list[LogScoreData] | UnsetType = UNSET
 
 
 class StepData(Struct):

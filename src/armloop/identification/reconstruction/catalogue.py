@@ -174,9 +174,12 @@ class Laws:
         return found
 
     def possible(self, arm: Arm, theta: Array, covariance: Array) -> Laws:
-        """Those that an arm can have with such coefficients."""
+        """Those that an arm can have with such coefficients; none without what it stands beside."""
         pairs = zip(self.chosen, self.added(arm, theta, covariance), strict=True)
-        return replace(self, chosen=[law for law, a in pairs if a.effect.possible(arm, a.parameters)])
+        own = [law for law, a in pairs if a.effect.possible(arm, a.parameters)]
+        return replace(
+            self, chosen=[law for law in own if not law.effect.beside or accompanied(law.effect, own)]
+        )
 
     def notes(self, effects: Sequence[AddedEffect]) -> list[str]:
         """What was found, a line each, with the parameters of the model's effects."""

@@ -14,8 +14,7 @@ import numpy as np
 from scipy.stats import f
 
 from armloop.identification.reconstruction.projected import CHANCE, Trial
-from armloop.laws.effects import EFFECTS, Effect
-from armloop.laws.effects.own import REGISTRY
+from armloop.laws.effects import Effect, kinds
 
 
 class _Chosen(Protocol):
@@ -25,9 +24,9 @@ class _Chosen(Protocol):
 
 def companions(chosen: Sequence[_Chosen]) -> list[Effect]:
     """Laws that an arm may have beside those chosen, at their joints, and only there."""
-    kinds = [kind for kind in [*EFFECTS.values(), *REGISTRY.own().values()] if kind.beside]
+    every = kinds()
     places = dict.fromkeys(
-        (kind, law.effect.joint) for law in chosen for kind in kinds if law.effect.name in kind.beside
+        (kind, law.effect.joint) for law in chosen for kind in every if law.effect.name in kind.beside
     )
     return [kind(joint) for kind, joint in places]
 

@@ -38,6 +38,7 @@ __all__ = [
     "effect_kind",
     "found_law",
     "hypotheses",
+    "kinds",
     "misplaced",
     "misstated",
     "register",
@@ -115,6 +116,15 @@ def misstated(kind: type[Effect], parameters: Mapping[str, Any], *, whole: bool 
     return kind.fault(parameters)
 
 
+def kinds() -> list[type[Effect]]:
+    """Every kind of effect there is, those of the user's own included.
+
+    Raises:
+        InputError: an effect of the user's own cannot be loaded.
+    """
+    return [*EFFECTS.values(), *REGISTRY.own().values()]
+
+
 def hypotheses(arm: Arm, built_in: bool = False) -> list[Effect]:
     """Every effect that is searched for, at every joint of an arm and at every pair of joints.
 
@@ -125,7 +135,7 @@ def hypotheses(arm: Arm, built_in: bool = False) -> list[Effect]:
         InputError: an effect of the user's own cannot be loaded.
     """
     listed: list[Effect] = []
-    for kind in [*EFFECTS.values(), *REGISTRY.own().values()]:
+    for kind in kinds():
         if not (kind.searched or (built_in and kind.built_in)):
             continue
         if kind.pair_wise:

@@ -178,7 +178,7 @@ class Effect(ABC):
         fault_order: a record is falsified by the lower ones first.
         nested: how many of its free parameters, the last, are another listed law by themselves, or nothing without the rest.
         alike: why another effect, by its name, can look the same on one motion, and which motion tells them apart.
-        looks_like: an effect whose likenesses it shares.
+        looks_like: the name of an effect whose likenesses it shares.
     """
 
     name: ClassVar[str]
@@ -269,7 +269,7 @@ class Effect(ABC):
         return (0.0,)
 
     def usual(self, context: Context) -> float | None:
-        """The value that it has unless one of :meth:`shapes` leaves clearly less, if any."""
+        """A value that is known beforehand, if any, asked beside the best of :meth:`shapes`: the likelier is taken."""
         return None
 
     def between(self, context: Context, shape: float) -> Sequence[float]:
@@ -293,7 +293,7 @@ class Effect(ABC):
         return beta
 
     def embed(self, x: Array) -> tuple[Array, Array]:
-        """Coefficients (p,) of free parameters x (k,), and their derivative (p, k), where physical laws tie coefficients."""
+        """Coefficients (p,) of free parameters x (k,), and their derivative (p, k); the identity unless laws tie them."""
         return x, np.eye(len(x))
 
     def alone(self, x: Array) -> slice:
