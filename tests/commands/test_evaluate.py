@@ -28,8 +28,18 @@ def test_of_several_logs_each_has_its_errors(tmp_path: Path, capsys: pytest.Capt
     heavier = run(4)
     heavier = replace(heavier, tau=heavier.tau * [1.0, 1.2, 1.0])
     paths = [str(tmp_path / f"{name}.csv") for name in ("same", "changed")]
-    for path, log in zip(paths, (run(3), heavier), strict=True):
+    # of the same name in another folder
+    (tmp_path / "again").mkdir()
+    paths.append(str(tmp_path / "again" / "changed.csv"))
+    for path, log in zip(paths, (run(3), heavier, run(5)), strict=True):
         write_log(path, log)
+    assert main(["evaluate", str(model), *paths, "--json"]) == 0
+    assert [one["log"] for one in json.loads(capsys.readouterr().out)["logs"]] == [
+        "same",
+        "changed",
+        "changed",
+    ]
+    paths.pop()
     assert main(["evaluate", str(model), *paths, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     same, changed = answer["logs"]

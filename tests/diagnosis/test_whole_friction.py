@@ -22,7 +22,7 @@ from synthetic import (
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
-from armloop.diagnosis import diagnose
+from armloop.diagnosis import diagnose, trials
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.outcomes import Found
@@ -128,3 +128,43 @@ def test_a_known_fall_is_the_usual_one() -> None:
     assert law.shapes(known) == law.shapes(unknown)
     # there it has no derivative: of few slow samples any velocity nearby could be made to fit
     assert law.columns(known, 0.1).shape[1] == 1 and law.columns(known, 0.2).shape[1] == 2
+
+
+@pytest.mark.parametrize(
+    ("usual", "likelihoods", "possible", "taken"),
+    [
+        # judged on what no shape was chosen by, the likelier is taken
+        (2.0, {2.0: 5.0, 3.0: 4.0}, {2.0, 3.0}, 2.0),
+        (2.0, {2.0: 4.0, 3.0: 5.0}, {2.0, 3.0}, 3.0),
+        (2.0, {2.0: 5.0, 3.0: 4.0}, {3.0}, 3.0),
+        (2.0, {2.0: 4.0, 3.0: 5.0}, {2.0}, 2.0),
+        (2.0, {2.0: 5.0, 3.0: 4.0}, set(), None),
+        # beyond what the run shows, and where none is known, it is not asked
+        (9.0, {3.0: 4.0}, {3.0}, 3.0),
+        (None, {3.0: 4.0}, {3.0}, 3.0),
+    ],
+)
+def test_what_is_known_beforehand_is_a_hypothesis_beside_the_best_of_the_grid(
+    usual: float | None,
+    likelihoods: dict[float, float],
+    possible: set[float],
+    taken: float | None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fitted(evidence: Any, residual: Any, effects: Any, shapes: Any, columns: Any) -> Any:
+        shape = shapes[-1].final
+        return SimpleNamespace(
+            shape=shape, score=likelihoods[shape], is_possible=lambda k, tried: shape in possible
+        )
+
+    monkeypatch.setattr(trials, "fit", fitted)
+    monkeypatch.setattr(trials, "told", lambda score: score)
+    monkeypatch.setattr(trials, "_best_shape", lambda known, effect, grid: Shape.fixed(3.0))
+    monkeypatch.setattr(trials._Grid, "of", lambda *_: "a grid")
+    one: Any = SimpleNamespace(indices=(0,), usual=lambda context: usual)
+    evidence: Any = SimpleNamespace(
+        rows=np.ones((4, 1), dtype=bool), tried=lambda effect: [1.0, 3.0, 4.0], context=None
+    )
+    known = Known(evidence, np.zeros((4, 1)), SimpleNamespace(effects=(), shapes=()))  # type: ignore[arg-type]
+    trial: Any = known.trial(one)
+    assert (None if trial is None else trial.shape) == taken

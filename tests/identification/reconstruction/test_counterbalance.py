@@ -13,8 +13,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque
 
 from armloop.data.motion import Motion
 from armloop.dynamics import Dynamics
-from armloop.identification.reconstruction import Options, reconstruct
-from armloop.identification.reconstruction.catalogue import Laws
+from armloop.identification.reconstruction import Options, catalogue, reconstruct
 from armloop.identification.reconstruction.companions import accompanied, companions, is_there
 from armloop.laws.effects import Context, Estimate, effect
 from armloop.model import ReconstructedModel
@@ -114,8 +113,6 @@ def test_it_is_there_if_its_coefficients_are() -> None:
 
 
 def test_one_without_its_spring_goes(monkeypatch: pytest.MonkeyPatch) -> None:
-    from armloop.identification.reconstruction import catalogue
-
     kept = [catalogue.Law(effect(name, 2), 0.0, 2) for name in ("joint_spring", "counterbalance")]
     monkeypatch.setattr(catalogue.Laws, "columns", lambda self, arm, samples: self.chosen[0].effect.name)
     nothing: Any = None
@@ -124,7 +121,10 @@ def test_one_without_its_spring_goes(monkeypatch: pytest.MonkeyPatch) -> None:
         def bench(laws: Any) -> Any:
             return SimpleNamespace(trial=worth.__getitem__)
 
-        return [law.effect.name for law in catalogue.pruned(Laws(kept, 10), bench, nothing, nothing).chosen]
+        return [
+            law.effect.name
+            for law in catalogue.pruned(catalogue.Laws(kept, 10), bench, nothing, nothing).chosen
+        ]
 
     there: Any = SimpleNamespace(coefficients=np.array([9.0, 0.0]), covariance=np.eye(2), blocks=40)
     spring: Any = SimpleNamespace(share=0.5, score=99.0, blocks=40, everywhere=True)
@@ -144,3 +144,12 @@ def test_its_parameters_are_those_of_its_columns() -> None:
     assert values["amplitude"] == pytest.approx(5.0) and found["amplitude"].std_error == pytest.approx(0.1)
     words = LAW.sentence({**found, "amplitude": Estimate(5.0, 0.1, "N*m")})
     assert "5.00 ± 0.10 N*m" in words and "no part of the first moments" in words
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_one_whose_spring_no_arm_has_goes_with_it(there: bool) -> None:
+    kept = [catalogue.Law(effect(name, 2), 0.0, 2) for name in ("joint_spring", "counterbalance")]
+    # a spring that pushes is none
+    x = np.array([5.0 if there else -5.0, 0.1, 3.0, 4.0])
+    found = catalogue.Laws(kept, 10).possible(load_arm("three_axis"), x, 1e-4 * np.eye(4))
+    assert [law.effect.name for law in found.chosen] == (["joint_spring", "counterbalance"] if there else [])
