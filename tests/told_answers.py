@@ -89,7 +89,7 @@ class Answers:
                 and not self.given.get("untold")
             ),
             "event_untold": lambda event: f"not told: {event}",
-            "localised": lambda evidence, fit, left, known: [],
+            "localised": lambda evidence, outcome, left, known: self.given.get("localised", []),
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
             "plainest": lambda evidence, outcome, among: self.note(
                 "plain", (evidence.name, list(among)), outcome

@@ -129,15 +129,11 @@ def test_of_a_joint_of_which_something_hidden_is_told_nothing_else_is_suspected(
         "of_a_constant_pull": ["a counterweight"],
         "of_a_balancer": ["gas"],
         "of_an_efficiency": ["a gear"],
+        "localised": ["where it is slow"],
     }
     answers = Answers(monkeypatch, masked=((hidden, hidden),), suspected=[law], **told)
     reasons = judged(jobs=2).reasons
-    assert (
-        "a model of one log" in reasons
-        and "a counterweight" in reasons
-        and "gas" in reasons
-        and "a gear" in reasons
-    )
+    assert {sentence for each in told.values() for sentence in each} <= set(reasons)
     assert answers.asked["suspected"] == ("account", [], asked)
     assert any("viscous friction at joint 2 would explain" in reason for reason in reasons) == (not asked)
     (said,) = [

@@ -94,7 +94,10 @@ def test_all_parts_are_told_within_their_errors(model: ReconstructedModel, seed:
         error = float(np.asarray(estimate.std_error))
         assert abs(float(np.asarray(estimate.value)) - MORE * size) < 4 * error < 2 * MORE * size
     assert added["stribeck_friction"]["velocity"].value == pytest.approx(STRIBECK_VELOCITY, rel=0.2)
+    (grown,) = [reason for reason in found.reasons if reason.endswith("times what the model has")]
+    assert grown.startswith("joint 2: ") and "viscous friction is 1.8" in grown
     # none removes much beside the others
+    assert found.outcome.together > 0.99
     words = findings(found)
     assert any(text.startswith("Together they remove") for text in words)
     assert sum("Beside the others it removes" in text for text in words) == 3
@@ -117,6 +120,12 @@ def test_laws_that_lie_between_them_give_way_to_all_three(model: ReconstructedMo
         assert not list(search._whole_friction(found))
         search.barred, search.most = [], 2
         assert not list(search._whole_friction(found))
+
+
+def test_a_models_falls_are_known(model: ReconstructedModel) -> None:
+    context = model.context(from_point_to_point(3, 2.0), [effect("stribeck_friction", 2)])
+    assert context.falls == tuple(map(model.friction.stribeck_velocity, range(3)))
+    assert all(abs(fall / STRIBECK_VELOCITY - 1) < 0.3 for fall in context.falls)
 
 
 def test_a_known_fall_is_the_usual_one() -> None:

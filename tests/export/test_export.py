@@ -18,6 +18,7 @@ from armloop.cli import main
 from armloop.data.motion import Motion
 from armloop.export import export
 from armloop.export.c_code import c_source
+from armloop.export.expressible import random_motion
 from armloop.export.reading_c import CompiledTorque, compiler
 from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionTerm
@@ -96,6 +97,14 @@ def test_a_tilt_reads_back_with_the_first_moment_that_a_level_arm_hides(tmp_path
         model = model_of(ARMS[name], disguised(ARMS[name], rotors), friction=PLAIN, effects=(tilt,))
         found = export(model, "mjcf", tmp_path / "arm")
         assert found.unsaid is not None and (found.unsaid < 1e-6 * found.rms).all()
+
+
+def test_states_are_as_often_slow_in_each_octave_as_fast():
+    model = model_of(ARMS["three_axis"])
+    speeds = np.abs(random_motion(model, 4000, seed=1).v) / model.ranges[1]
+    assert speeds.min() > 0.02 and speeds.max() < 1.0
+    octaves = np.histogram(np.log2(speeds), bins=[-5, -4, -3, -2, -1, 0])[0]
+    np.testing.assert_allclose(octaves, octaves.mean(), rtol=0.1)
 
 
 def test_a_tilt_of_an_arm_on_a_rail_reads_back_with_what_of_it_has_no_weight(tmp_path):
