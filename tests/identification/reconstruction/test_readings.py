@@ -60,9 +60,12 @@ def orders(kinds: str) -> list[list[int]]:
     ]
 
 
-def turned(log: MotionLog, joints: tuple[int, ...]) -> MotionLog:
-    """A record whose joints count in the other direction."""
-    return Reading(np.arange(log.joints), turned=joints).of(log, arm_of("R" * log.joints))
+def turned(log: MotionLog, joints: tuple[int, ...], tau: bool = True) -> MotionLog:
+    """A record whose joints count in the other direction, their torques too."""
+    signs = np.where(np.isin(np.arange(log.joints), joints), -1.0, 1.0)
+    return unchecked_log(
+        time=log.time, q=signs * log.q, v=signs * log.v, tau=(signs if tau else 1) * log.tau, name=log.name
+    )
 
 
 @pytest.mark.parametrize(
@@ -229,16 +232,8 @@ def test_small_arms_are_read_in_every_order_of_the_same_kinds_and_larger_ones_in
 def test_units_are_asked_of_where_there_are_angles_and_scale_these_alone() -> None:
     assert [reading.unit for reading in readings(arm_of("PP")) if reading.unit] == []
     turns, degrees = [reading for reading in readings(arm_of("RP")) if reading.unit]
-    q = np.arange(8.0).reshape(4, 2)
-    log = unchecked_log(time=np.arange(4.0), q=q, v=q + 10, tau=q + 20, name="run")
-    for reading, factor in ((turns, 2 * np.pi), (degrees, np.pi / 180)):
-        read = reading.of(log, arm_of("RP"))
-        np.testing.assert_allclose(read.q, q * [factor, 1.0])
-        np.testing.assert_allclose(read.v, (q + 10) * [factor, 1.0])
-        assert (read.tau == q + 20).all() and (read.time == log.time).all() and read.name == "run"
-    read = Reading(np.array([1, 0])).of(log, arm_of("RR"))
-    assert (read.q == q[:, ::-1]).all() and (read.v == (q + 10)[:, ::-1]).all()
-    assert (read.tau == (q + 20)[:, ::-1]).all()
+    assert turns.scale(arm_of("RP")).tolist() == [2 * np.pi, 1.0]
+    assert degrees.scale(arm_of("PR")).tolist() == [1.0, np.pi / 180]
 
 
 def fit_of(relative: list[float], faults: int = 0) -> Fit:
@@ -247,18 +242,17 @@ def fit_of(relative: list[float], faults: int = 0) -> Fit:
 
 
 class Given:
-    """A record whose other readings leave what is given, by what they are; or none where there is too little motion."""
+    """A record whose other readings leave what is given, by what they are."""
 
     def __init__(self, plain: Fit, others: dict[str, Fit]) -> None:
         self.plain, self.others = plain, others
         self.arm = arm_of("R" * len(plain.relative))
 
-    def of(self, logs: list[MotionLog], arm: object, cutoff_hz: float, unit: Array) -> Any:
-        return self._left("turns" if unit[0] > 1 else "degrees")
-
-    def read(self, order: Index, signs: Array, torque_signs: Array) -> Any:
-        turned = ", ".join(str(j + 1) for j in np.flatnonzero(signs < 0))
-        if (torque_signs != signs).any():
+    def read(self, order: Index, factors: Array, torque_signs: Array) -> Any:
+        if abs(factors[0]) != 1:
+            return self._left("turns" if factors[0] > 1 else "degrees") or self._left("plain")
+        turned = ", ".join(str(j + 1) for j in np.flatnonzero(factors < 0))
+        if (torque_signs != factors).any():
             turned = f"{turned} against tau"
         return self._left(turned or "order") or self._left("plain")
 
@@ -289,12 +283,9 @@ class Given:
 def chosen(plain: Fit, others: dict[str, Fit], monkeypatch: pytest.MonkeyPatch) -> str:
     """What is said of a record of two joints."""
     given: Any = Given(plain, others)
-    monkeypatch.setattr(PlainFits, "of", given.of)
     zero = ZeroOffset(0, np.pi / 2, 0.01) if "zero" in others else None
     monkeypatch.setattr(readings_module, "other_zero", lambda problem, plain: zero)
-    q = np.zeros((3, len(plain.relative)))
-    log = unchecked_log(time=np.arange(3.0), q=q, v=q, tau=q, name="run")
-    return meant(given, [log], 10.0, plain)[0]
+    return meant(given, plain)[0]
 
 
 @pytest.mark.parametrize(
@@ -384,16 +375,25 @@ def test_small_arms_are_read_with_every_set_of_joints_turned(joints: int, sets: 
 
 
 def test_columns_read_otherwise_are_those_of_the_log_read_so() -> None:
-    arm, log, steady = three_axis(), run(3, 1.0), np.ones(3)
-    against = Reading(np.arange(3), turned=(1,), against=True)
-    for reading in (Reading(np.array([2, 0, 1])), Reading(np.arange(3), turned=(0, 2)), against):
-        whole = PlainFits.of([reading.of(log, arm)], arm, 10.0)
-        plain = PlainFits.of([log], arm, 10.0)
+    arm, log, steady, given = three_axis(), run(3, 1.0), np.ones(3), np.arange(3)
+    order = [2, 0, 1]
+    for reading, as_read in (
+        (Reading(np.array(order)), misread(log, order)),
+        (Reading(given, turned=(0, 2)), turned(log, (0, 2))),
+        (Reading(given, turned=(1,), against=True), turned(log, (1,), tau=False)),
+        (Reading(given, "degrees"), misread(log, [0, 1, 2], np.pi / 180)),
+    ):
+        whole, plain = (PlainFits.of([one], arm, 10.0) for one in (as_read, log))
         assert whole is not None and plain is not None
-        read = reading.problem(plain, [log], 10.0)
-        assert read is not None
-        for part in ("columns", "tau", "moving"):
+        read = reading.read(plain)
+        # of another unit friction keeps its shapes, whatever the speeds
+        r = read.base.count if reading.unit else read.table.columns.shape[2]
+        np.testing.assert_allclose(read.table.columns[..., :r], whole.table.columns[..., :r], atol=1e-9)
+        np.testing.assert_allclose(read.table.columns[..., r:], plain.table.columns[..., r:])
+        for part in ("tau", "moving"):
             np.testing.assert_allclose(getattr(read.table, part), getattr(whole.table, part), atol=1e-9)
-        mine, other = (one.fit(steady, np.arange(3)) for one in (read, whole))
-        np.testing.assert_allclose(mine.relative, other.relative, rtol=1e-6)
-        np.testing.assert_allclose(mine.inertia, other.inertia, rtol=1e-6)
+        np.testing.assert_allclose(read.mass, whole.mass, atol=1e-9)
+        if not reading.unit:
+            mine, other = (one.fit(steady, given) for one in (read, whole))
+            np.testing.assert_allclose(mine.relative, other.relative, rtol=1e-6)
+            np.testing.assert_allclose(mine.inertia, other.inertia, rtol=1e-6)

@@ -204,12 +204,10 @@ def table_at(
     corner: float,
     corners: list[float],
     aside: Sequence[Array] | None = None,
-    unit: Array | float = 1.0,
 ) -> Table | None:
     """Columns at one corner, at the instants that all corners share; None where no run is long enough.
 
     Args:
-        unit: (n,) that of the positions, in rad (m): so that dry friction fades at the same speeds in any.
         aside: per log, (B, 2) intervals that nothing is taken from, nor from where a filter has mixed it with them.
     """
     parts: list[tuple[Array, Array, Index, Mask]] = []
@@ -235,7 +233,7 @@ def table_at(
         inside = inside[numbers % stride == 0]
         if len(inside) == 0:
             continue
-        fading = np.sign(motion.v) * -np.expm1(-np.square(motion.v / (_FADES * unit)))
+        fading = np.sign(motion.v) * -np.expm1(-np.square(motion.v / _FADES))
         dry = smooth(samples, fading)[inside]
         part = motion.take(inside)
         N, n = part.q.shape

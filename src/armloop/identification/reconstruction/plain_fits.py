@@ -88,17 +88,15 @@ class PlainFits:
         logs: Sequence[MotionLog],
         arm: Arm,
         cutoff_hz: float,
-        unit: Array | float = 1.0,
         aside: Sequence[Array] | None = None,
     ) -> Self | None:
         """None where there is too little motion to judge.
 
         Args:
-            unit: (n,) that of the positions, in rad (m).
             aside: per log, (B, 2) intervals that take no part.
         """
         base = BaseParameters.of_arm(arm, rotors=True)
-        table = table_at(list(logs), arm, base, Conditioning(), cutoff_hz, [cutoff_hz], aside, unit)
+        table = table_at(list(logs), arm, base, Conditioning(), cutoff_hz, [cutoff_hz], aside)
         if table is None or (table.moving.sum(axis=0) < _FEWEST).any():
             return None
         q = np.concatenate([log.q for log in logs])
@@ -109,10 +107,14 @@ class PlainFits:
         """(P, n, n, r) mass matrices per unit of each parameter."""
         return mass_columns(self.arm, self.base, self.postures)
 
-    def read(self, order: Index, signs: Array, torque_signs: Array) -> Self:
-        """The same with the columns of joint ``order[k]`` in place k, q, v and tau of each times its sign."""
-        table, r = self.table, self.base.count
-        q, v, vdot = (signs * x[:, order] for x in (table.motion.q, table.motion.v, table.motion.vdot))
+    def read(self, order: Index, factors: Array, torque_signs: Array) -> Self:
+        """The same with the columns of joint ``order[k]`` in place k, q and v of each times its factor, tau its sign.
+
+        A factor is a direction, and a unit. A law of friction that is met badly may be met better at other speeds, which
+        says nothing of a unit: its columns keep their shapes.
+        """
+        table, r, signs = self.table, self.base.count, np.sign(factors)
+        q, v, vdot = (factors * x[:, order] for x in (table.motion.q, table.motion.v, table.motion.vdot))
         motion = replace(table.motion, q=q, v=v, vdot=vdot)
         columns = np.zeros_like(table.columns)
         columns[:, :, :r] = self.base.columns(self.arm, motion)
@@ -121,7 +123,7 @@ class PlainFits:
             columns[:, j, own] = table.columns[:, source, its] * [signs[j], signs[j], 1.0]
         tau, moving = torque_signs * table.tau[:, order], table.moving[:, order]
         read = replace(table, columns=columns, tau=tau, moving=moving, motion=motion)
-        return replace(self, table=read, postures=signs * self.postures[:, order])
+        return replace(self, table=read, postures=factors * self.postures[:, order])
 
     def under(self, down: Array) -> Self:
         """The same with gravity in another direction (3,), a unit vector in the base frame."""

@@ -8,13 +8,12 @@ for every other reading; a log is refused only where one of them explains all to
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import combinations, permutations
 from typing import NamedTuple
 
 import numpy as np
 
-from armloop.data.log import MotionLog, unchecked_log
 from armloop.identification.reconstruction.mounting import SECOND, other_mounting
 from armloop.identification.reconstruction.plain_fits import (
     AS_GOOD,
@@ -74,14 +73,6 @@ class Reading(NamedTuple):
     stance: Stance | None = None
     against: bool = False
 
-    def of(self, log: MotionLog, arm: Arm) -> MotionLog:
-        """The log as it would be, read so."""
-        scale = self.scale(arm)
-        signs = {"q": self.signs, "v": self.signs, "tau": self.torque_signs}
-        signals = {name: sign * getattr(log, name)[:, self.order] for name, sign in signs.items()}
-        signals |= {name: scale * signals[name] for name in ("q", "v")}
-        return unchecked_log(time=log.time, name=log.name, **signals)
-
     def scale(self, arm: Arm) -> Array:
         """(n,) rad (m) of a joint's unit."""
         return np.where(arm.revolute, _ANGLES.get(self.unit, 1.0), 1.0)
@@ -97,19 +88,10 @@ class Reading(NamedTuple):
         return np.ones(len(self.order)) if self.against else self.signs
 
     def read(self, plain: PlainFits) -> PlainFits:
-        """What is regressed of the record with its joints in this order and direction."""
-        return plain.read(self.order, self.signs, self.torque_signs)
-
-    def problem(self, plain: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float) -> PlainFits | None:
-        """What is regressed of the record, read so; None where there is too little motion."""
+        """What is regressed of the record, read so."""
         if self.stance is not None:
             return plain.as_of(self.stance.of(plain.arm))
-        if not self.unit:
-            return self.read(plain)
-        # a law of friction that is met badly may be met better at other speeds, and says nothing of a unit
-        return PlainFits.of(
-            [self.of(log, plain.arm) for log in logs], plain.arm, cutoff_hz, self.scale(plain.arm)
-        )
+        return plain.read(self.order, self.scale(plain.arm) * self.signs, self.torque_signs)
 
     def far_better(self, plain: Fit, other: Fit, sprung: Fit) -> bool:
         """Whether a record explained so, read so, is not meant as it stands; springs at its joints may explain as much."""
@@ -201,9 +183,7 @@ def _orders(n: int) -> Iterator[tuple[int, ...]]:
         yield tuple((k + step) % n for k in range(n))
 
 
-def meant(
-    problem: PlainFits, logs: Sequence[MotionLog], cutoff_hz: float, plain: Fit
-) -> tuple[str, Stance | None]:
+def meant(problem: PlainFits, plain: Fit) -> tuple[str, Stance | None]:
     """What is wrong with a record that another reading explains far better, the simplest of the best; or is slightly off.
 
     Args:
@@ -224,12 +204,9 @@ def meant(
     stances = [other for other in (other_mounting(problem, plain), other_zero(problem, plain)) if other]
     stood = (Reading(np.arange(n), stance=stance) for stance in stances)
     for reading in (*stood, *readings(problem.arm)):
-        if reading.turned and first.over(reading.read(few).left()) < PROMISING:
+        if (reading.turned or reading.unit) and first.over(reading.read(few).left()) < PROMISING:
             continue
-        read = reading.problem(problem, logs, cutoff_hz)
-        if read is None:
-            continue
-        other = read.fit()
+        other = reading.read(problem).fit()
         if reading.slight or reading.far_better(plain, other, sprung):
             found.append((reading, plain.over(other)))
             poorly[id(reading)] = _another_arm(other)

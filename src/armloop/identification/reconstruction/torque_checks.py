@@ -83,9 +83,9 @@ def check_torques(
     faults = list(_one_fault(problem, plain, arm.n))
     for fault, left in faults:
         # a whole record that is read wrongly may look like it, too, but then that explains far more
-        if not meant(problem, chosen, cutoff_hz, left)[0]:
+        if not meant(problem, left)[0]:
             raise LogError(f"{names}: {fault}")
-    wrong, found = _otherwise(problem, chosen, cutoff_hz, plain)
+    wrong, found = _otherwise(problem, plain)
     times = times_lighter(problem, plain)
     if wrong:
         raise LogError(f"{names}: {wrong}{f'; or {lighter(times)}' if times else ''}")
@@ -124,15 +124,13 @@ def _one_fault(problem: Problem, plain: Fit, n: int) -> Iterator[tuple[str, Fit]
         yield fault, problem.fit(factors)
 
 
-def _otherwise(
-    problem: PlainFits, logs: list[MotionLog], cutoff_hz: float, plain: Fit
-) -> tuple[str, list[Stance]]:
+def _otherwise(problem: PlainFits, plain: Fit) -> tuple[str, list[Stance]]:
     """What is wrong with a record that is meant otherwise, if anything is; and by what the arm stands slightly otherwise."""
-    wrong, stance = meant(problem, logs, cutoff_hz, plain)
+    wrong, stance = meant(problem, plain)
     found = together(problem, plain) or ([stance] if stance else [])
     if wrong and found:
         stood = problem.as_of(as_it_stands(problem.arm, found))
-        wrong, _ = meant(stood, logs, cutoff_hz, stood.fit())
+        wrong, _ = meant(stood, stood.fit())
     return wrong, found
 
 
