@@ -19,6 +19,10 @@ def tried(effect: Any) -> Any:
     return tuple(effect.shapes(None))
 
 
+#: Of effects whose parameters are their own.
+OWN = [fit.Shape.fixed(0.0)] * 2
+
+
 class Rows:
     """An evidence of one joint and four samples whose column is the nonlinear parameter itself."""
 
@@ -45,7 +49,7 @@ def shaped(refined: Any, tried: tuple[float, ...] = (0.0,)) -> Any:
 
 def test_rows_are_made_anew_for_other_nonlinear_parameters_alone() -> None:
     evidence: Any = Rows()
-    problem = fit._Problem(evidence, np.ones(4), [shaped(lambda x, value: value)], {})
+    problem = fit._Problem(evidence, np.ones(4), [shaped(lambda x, value: value)], OWN[:1], {})
     for value in (2.0, 2.0, 3.0, 3.0, 2.0):
         rows = problem.rows([value])
         assert (rows.stacked.X == value).all() and rows.sizes == [1]
@@ -60,7 +64,7 @@ def test_columns_of_what_is_known_are_made_once_for_all_that_is_tried_beside_it(
     known: fit.Columns = {}
     for other, value in ((7.0, 2.0), (8.0, 2.0), (9.0, 3.0), (9.0, 4.0), (9.0, 4.0)):
         effects = [shaped(lambda x, value: value), shaped(lambda x, value: value)]
-        rows = fit._Problem(evidence, np.ones(4), effects, known).rows([value, other])
+        rows = fit._Problem(evidence, np.ones(4), effects, OWN, known).rows([value, other])
         assert (rows.stacked.X == [value, other]).all() and rows.sizes == [1, 1]
     # no more are kept than two
     assert evidence.asked == [2.0, 7.0, 8.0, 3.0, 9.0, 4.0, 9.0, 4.0, 9.0]
@@ -81,7 +85,7 @@ def test_moments_are_those_of_the_rows_outside_a_fold() -> None:
 def test_a_nonlinear_parameter_is_refined_some_times_or_until_it_stays(without: int | None) -> None:
     evidence: Any = Rows()
     y = np.array([6.0, 6.0, 12.0, 12.0]) if without is not None else np.full(4, 6.0)
-    doubling = fit._Problem(evidence, y, [shaped(lambda x, value: 2 * value)], {})
+    doubling = fit._Problem(evidence, y, [shaped(lambda x, value: 2 * value)], OWN[:1], {})
     rows, (beta, _, J, values) = fit._solved(doubling, [1.0], without)
     last = 2.0**fit.REFINEMENTS
     # what is returned belongs to the rows that are returned
@@ -89,7 +93,7 @@ def test_a_nonlinear_parameter_is_refined_some_times_or_until_it_stays(without: 
     assert_allclose(beta, 6.0 / last)
     assert evidence.asked == [1.0, 2.0, 4.0, 8.0]
     evidence = Rows()
-    staying = fit._Problem(evidence, y, [shaped(lambda x, value: 3.0)], {})
+    staying = fit._Problem(evidence, y, [shaped(lambda x, value: 3.0)], OWN[:1], {})
     assert fit._solved(staying, [1.0], without)[1].values == [3.0]
     assert evidence.asked == [1.0, 3.0]
 
@@ -107,7 +111,7 @@ def test_what_is_judged_is_the_law_at_some_nonlinear_parameter() -> None:
             ),
         )
         y = X @ [2.0, 2.0 * ratio]
-        _, (beta, _, J, _) = fit._solved(fit._Problem(evidence, y, [drift], {}), [1.0], None)
+        _, (beta, _, J, _) = fit._solved(fit._Problem(evidence, y, [drift], OWN[:1], {}), [1.0], None)
         law = X @ [1.0, nearest]
         level = law @ y / (law @ law)  # least squares of what the law can be
         assert_allclose(beta, [level, nearest * level], rtol=1e-6)
@@ -150,7 +154,7 @@ def test_what_a_run_shows_alone_counts_no_error_of_the_model() -> None:
     rows = fit.Stacked(ones, y, blocks, blocks % 2, np.zeros(8, dtype=int), 1, blocks, 1.5 * ones)
     solution = fit.Solution(np.array([3.0]), [np.array([3.0])], np.eye(1), [0.0])
     own: Any = effect("viscous_friction", 1)
-    found = fit.Fit(None, (own,), (), solution, np.zeros((2, 8)), rows)  # type: ignore[arg-type]
+    found = fit.Fit(None, (own,), (OWN[0],), solution, np.zeros((2, 8)), rows)  # type: ignore[arg-type]
     spread = float(fit.covariance(ones, y - 3.0, rows)[0, 0])
     assert found.clear[0] == pytest.approx(3.0 / np.sqrt(spread), rel=1e-6)
     assert found.shown[0] == pytest.approx(3.0 / np.sqrt(spread - 1.5**2), rel=1e-6)
@@ -167,7 +171,7 @@ def test_effects_whose_columns_are_nearly_alike_may_be_plain_together_alone() ->
     beta = np.linalg.lstsq(X, y)[0]
     solution = fit.Solution(beta, list(beta[:, None]), np.eye(3), [0.0] * 3)
     own: Any = effect("viscous_friction", 1)
-    found = fit.Fit(None, (own,) * 3, (), solution, np.zeros((2, 40)), rows)  # type: ignore[arg-type]
+    found = fit.Fit(None, (own,) * 3, (OWN[0],) * 3, solution, np.zeros((2, 40)), rows)  # type: ignore[arg-type]
     assert max(found.clear[:2]) < 2.0
     assert found.clear_together([0, 1]) > 10.0
     assert found.clear_together([2]) == pytest.approx(found.clear[2])

@@ -76,7 +76,7 @@ def test_what_was_found_before_is_part_of_what_the_model_has() -> None:
 
 def test_a_verdict_says_it_last() -> None:
     standing = Standing(["a reason"], [], False)
-    outcome = SimpleNamespace(added=lambda: MORE[:1])
+    outcome = SimpleNamespace(added=lambda: MORE[:1], growths=dict)
     found: Any = replace(EMPTY, outcome=outcome, standing=standing)
     known = model([{}, law(coulomb=3.0)])
     assert with_growth(known, found).standing.reasons == [

@@ -183,7 +183,7 @@ class TestTrials:
         free = [np.array([4.0]), np.array([5.0, 6.0])]
         nothing: Any = None
         solution = Solution(np.zeros(3), free, np.eye(3), [7.0, 8.0])
-        made = Fit(nothing, (first, of), (), solution, np.zeros((2, 0)), nothing)
+        made = Fit(nothing, (first, of), (Shape.fixed(0.0),) * 2, solution, np.zeros((2, 0)), nothing)
         vars(made)["_spread"] = [np.eye(1), np.diag([2.0, 3.0])]
         assert made.is_possible(-1, [8.0]) is possible and not made.is_possible(1, [9.0])
         assert not told[0].any() and told[0].shape == (2, 2)
@@ -195,7 +195,8 @@ class TestTrials:
         J = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]])
         rows: Any = SimpleNamespace(X=np.ones((2, 3)), y=np.array([10.0, 20.0]))
         solution = Solution(np.array([1.0, 2.0, 3.0]), [np.zeros(1), np.zeros(2)], J, [0.0, 0.0])
-        own, other = Fit(cast(Any, None), (), (), solution, np.zeros((2, 0)), rows)._spread
+        effects, shapes = cast(Any, (None, None)), (Shape.fixed(0.0),) * 2
+        own, other = Fit(cast(Any, None), effects, shapes, solution, np.zeros((2, 0)), rows)._spread
         np.testing.assert_array_equal(own, [[0.0]])
         np.testing.assert_array_equal(other, [[4.0, 5.0], [7.0, 8.0]])
         ((X, left),) = asked

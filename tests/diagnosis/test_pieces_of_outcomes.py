@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from named_shapes import Called
 
 from armloop.diagnosis import outcomes
 from armloop.laws.effects import effect
@@ -55,7 +56,9 @@ class TestOutcomes:
     @staticmethod
     def outcome(*names: str) -> Any:
         effects = [SimpleNamespace(place=name, other_joint=2 if name in "xyz" else None) for name in names]
-        found = [SimpleNamespace(effect=e, shape=name) for e, name in zip(effects, names, strict=True)]
+        found = [
+            SimpleNamespace(effect=e, shape=Called(name)) for e, name in zip(effects, names, strict=True)
+        ]
         return outcomes.Outcome(found, None, SimpleNamespace(score="all"))  # type: ignore[arg-type]
 
     @pytest.fixture(autouse=True)
@@ -156,7 +159,8 @@ class TestOutcomes:
 
         def kept(names: str, settled: int = 0, alike: bool = True) -> str:
             found: Any = [
-                SimpleNamespace(effect=SimpleNamespace(name=kinds[name]), shape=name) for name in names
+                SimpleNamespace(effect=SimpleNamespace(name=kinds[name]), shape=Called(name))
+                for name in names
             ]
             nothing: Any = None
             given = outcomes.Outcome(found, nothing, fitted(names))
@@ -223,7 +227,7 @@ class TestOutcomes:
         laws = (("coulomb_friction", 2), ("presliding_hysteresis", 2), ("presliding_hysteresis", 1))
         laws += (("viscous_friction", 2), ("torque_drift", 2))
         found: Any = [
-            SimpleNamespace(effect=effect(*law), shape=name, share=0.9, rivals=[])
+            SimpleNamespace(effect=effect(*law), shape=Called(name), share=0.9, rivals=[])
             for law, name in zip(laws, "abcde", strict=True)
         ]
         nothing: Any = None

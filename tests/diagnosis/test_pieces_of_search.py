@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from named_shapes import Called
 from scores import score
 
 from armloop.diagnosis import outcomes, posterior
@@ -86,7 +87,7 @@ class TestSearch:
             now = posterior.told(known.fit.score)
             odds = [posterior.log_posterior(evidence, left, [e]) - now for e, left in more]
             return [
-                SimpleNamespace(effect=e, shape=e.upper(), score=left)
+                SimpleNamespace(effect=e, shape=Called(e.upper()), score=left)
                 for (e, left), likely in zip(more, odds, strict=True)
                 if likely >= least and not (least > -np.inf and not known.names and e[0] in hopeless)
             ]

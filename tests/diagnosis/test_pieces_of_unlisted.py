@@ -12,10 +12,14 @@ from synthetic import three_axis
 
 from armloop.data.motion import Motion
 from armloop.diagnosis import unlisted
+from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead_of
 from armloop.diagnosis.posterior import LOG_ODDS
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Estimate, hypotheses
+
+#: Of an effect whose parameters are its own.
+OWN = Shape.fixed(0.0)
 
 
 class TestLawThatIsNotListed:
@@ -28,7 +32,9 @@ class TestLawThatIsNotListed:
             held_out = np.array([9.0, *np.full(4, np.sqrt(energy / 4))])
             fit = SimpleNamespace(score=Score.of(sum(found), held_out, joint, block, 2))
             effects = [
-                SimpleNamespace(effect=SimpleNamespace(complexity=c, label=lambda c=c: f"effect {c}"))
+                SimpleNamespace(
+                    effect=SimpleNamespace(complexity=c, label=lambda c=c: f"effect {c}"), shape=OWN
+                )
                 for c in found
             ]
             return SimpleNamespace(found=effects, after=fit, hidden=[])
@@ -78,7 +84,7 @@ class TestLawThatIsNotListed:
     ) -> None:
         arm, rows, left = three_axis(), 100, 200.0
         evidence: Any = SimpleNamespace(model=SimpleNamespace(arm=arm))
-        effects = [SimpleNamespace(effect=SimpleNamespace(complexity=c)) for c in (1, 2)]
+        effects = [SimpleNamespace(effect=SimpleNamespace(complexity=c), shape=OWN) for c in (1, 2)]
         block = np.arange(rows) // 5
 
         def score(energy: float) -> Score:
@@ -127,10 +133,12 @@ class TestLawThatIsNotListed:
         """Of joint 2 the effects leave ``left`` on 100 rows, the law ``rest``."""
         asked: list[int] = []
         named = [
-            SimpleNamespace(effect=SimpleNamespace(indices=(1,), complexity=1, label=lambda: "effect"))
+            SimpleNamespace(
+                effect=SimpleNamespace(indices=(1,), complexity=1, label=lambda: "effect"), shape=OWN
+            )
             for _ in range(2)
         ]
-        arm = SimpleNamespace(effect=SimpleNamespace(indices=(), complexity=3))
+        arm = SimpleNamespace(effect=SimpleNamespace(indices=(), complexity=3), shape=OWN)
 
         def verdict(
             left: float, found: list[Any], kept: list[Any], form: str = "v2^3", rest: float = 55.0

@@ -197,7 +197,8 @@ def left(held_out: Any, block: Any, joint: Any = None, complexity: int = 1, wron
     outside = np.full((2, len(block)), wrong)
     outside[block % 2, np.arange(len(block))] = held_out
     effects = tuple(SimpleNamespace(complexity=1) for _ in range(complexity))
-    return Fit(cast(Any, None), cast(Any, effects), (), NOTHING, outside, stacked).score
+    shapes = (Shape.fixed(0.0),) * complexity
+    return Fit(cast(Any, None), cast(Any, effects), shapes, NOTHING, outside, stacked).score
 
 
 def test_only_what_was_held_out_judges() -> None:

@@ -8,7 +8,7 @@ judged on folds that were not fitted.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -79,11 +79,17 @@ class Whitening:
         columns: (N, n, r) torque of each, one standard deviation, N·m (N).
         memories: (n,) of so many rows that count one is independent.
         taken: (N, n) torque of them, as they were predicted, that the model has, N·m (N): residuals lack it, rows do not.
+        effects: of the model, that torque.
     """
 
     columns: Array
     memories: Array
     taken: Array
+    effects: Sequence[AddedEffect] = ()
+
+    def are(self, added: AddedEffect) -> bool:
+        """Whether an effect of the model is of them."""
+        return any(added is one for one in self.effects)
 
     def of(self, rows: Mask, scale: Array) -> list[tuple[Array, Array]]:
         """Per joint an orthonormal basis (R, r) of its weighted columns at rows (N, n), and which part (r,) of it goes."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -13,10 +13,10 @@ from scipy.stats import chi2, norm
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
-from armloop.laws.effects.base import Place
+from armloop.laws.effects.base import Place, number
 from armloop.model import AddedEffect
 from armloop.regression.clustered import clustered_covariance
-from armloop.regression.embedded import RIDGE, solve, unit_scale
+from armloop.regression.embedded import RIDGE, Linear, solve, unit_scale
 from armloop.regression.moments import Moments, total
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array
@@ -27,24 +27,47 @@ REFINEMENTS = 3
 _KEPT = 32
 
 
+class Proportion(NamedTuple):
+    """An effect's coefficient, with its standard error, per unit of the one free parameter that it has with others."""
+
+    size: float
+    std_error: float = 0.0
+
+
 class Shape(NamedTuple):
     """An effect's nonlinear parameter: chosen on all blocks, and for each fold on the blocks outside it.
 
     Only the latter may judge a fold, else its own data would have had a say.
+
+    Attributes:
+        proportion: of an effect that has but one free parameter together with others of its joint; else None.
     """
 
     final: float
     without: tuple[float, ...]
+    proportion: Proportion | None = None
 
     @staticmethod
-    def fixed(value: float) -> Shape:
+    def fixed(value: float, proportion: Proportion | None = None) -> Shape:
         """A value that was not chosen from data."""
-        return Shape(value, (value,) * FOLDS)
+        return Shape(value, (value,) * FOLDS, proportion)
+
+    @property
+    def size(self) -> float:
+        """The coefficient per unit of a free parameter."""
+        return 1.0 if self.proportion is None else self.proportion.size
+
+
+def leaders(effects: Sequence[Effect], shapes: Sequence[Shape]) -> list[int]:
+    """Of each effect the first of those whose coefficients are in proportion to its own; itself where none are."""
+    first: dict[int | None, int] = {}
+    pairs = enumerate(zip(effects, shapes, strict=True))
+    return [k if s.proportion is None else first.setdefault(e.joint, k) for k, (e, s) in pairs]
 
 
 class Solution(NamedTuple):
     """Least-squares coefficients beta (p,), the free parameters of each effect that they are functions of, their derivative
-    J (p, k), and each effect's nonlinear parameter.
+    J (p, k), and each effect's nonlinear parameter. Of effects in proportion the first has the parameter of all.
     """
 
     beta: Array
@@ -83,12 +106,33 @@ class Fit:
     @cached_property
     def parameters(self) -> tuple[dict[str, Estimate], ...]:
         """One dict of estimates per effect, from all blocks."""
+        every = zip(self.effects, self.free, self._spread, self.solution.values, self._of_sizes, strict=True)
         return tuple(
-            effect.estimates(self.arm, free, spread, value)
-            for effect, free, spread, value in zip(
-                self.effects, self.solution.free, self._spread, self.solution.values, strict=True
-            )
+            effect.estimates(self.arm, free, spread + of_size, value)
+            for effect, free, spread, value, of_size in every
         )
+
+    @property
+    def _of_sizes(self) -> Iterator[float]:
+        """Variance of each effect's coefficient by that of what it is in proportion to."""
+        for k, shape in enumerate(self.shapes):
+            growth = self.growth(k)
+            error = 0.0 if growth is None or shape.proportion is None else shape.proportion.std_error
+            yield 0.0 if growth is None else (number(growth.value) * error) ** 2
+
+    def growth(self, k: int) -> Estimate | None:
+        """The free parameter that an effect has with others of its joint; None if its parameters are its own."""
+        first = leaders(self.effects, self.shapes)[k]
+        if self.shapes[k].proportion is None:
+            return None
+        error = float(np.sqrt(self._spread[first][0, 0])) / self.shapes[first].size
+        return Estimate(float(self.solution.free[first][0]), error, "1")
+
+    @cached_property
+    def free(self) -> tuple[Array, ...]:
+        """The free parameters of each effect."""
+        pairs = zip(leaders(self.effects, self.shapes), self.shapes, strict=True)
+        return tuple(self.solution.free[k] * shape.size for k, shape in pairs)
 
     def is_possible(self, k: int, tried: Sequence[float]) -> bool:
         """Whether an effect's parameters are physically possible, and what a run can show.
@@ -96,7 +140,7 @@ class Fit:
         Args:
             tried: the values of its nonlinear parameter that were tried.
         """
-        effect, free, value = self.effects[k], self.solution.free[k], self.solution.values[k]
+        effect, free, value = self.effects[k], self.free[k], self.solution.values[k]
         # most are, whatever their errors
         bare = effect.estimates(self.arm, free, np.zeros((len(free), len(free))), value)
         return effect.resolved(bare, tried) and (
@@ -120,7 +164,7 @@ class Fit:
 
     def _clear(self, spreads: Sequence[Array]) -> tuple[float, ...]:
         each = []
-        for effect, free, spread in zip(self.effects, self.solution.free, spreads, strict=True):
+        for effect, free, spread in zip(self.effects, self.free, spreads, strict=True):
             own = effect.alone(free)
             clearest = np.max(np.abs(free[own]) / np.sqrt(np.diag(spread)[own] + TINY), initial=0.0)
             each.append(max(float(clearest), deviate(*wald_statistic(free[own], spread[own, own]))))
@@ -132,7 +176,7 @@ class Fit:
 
         Where columns are alike each coefficient may be anything, though what they do together is plain.
         """
-        return tuple(wald_statistic(*each) for each in zip(self.solution.free, self._spread, strict=True))
+        return tuple(wald_statistic(*each) for each in zip(self.free, self._spread, strict=True))
 
     @cached_property
     def _spread(self) -> list[Array]:
@@ -144,14 +188,16 @@ class Fit:
 
         Of effects whose columns are nearly alike none need be clear by itself.
         """
-        blocks = self._blocks()
-        own = np.concatenate([np.arange(blocks[k].start, blocks[k].stop) for k in those])
+        blocks, first = self._blocks(), leaders(self.effects, self.shapes)
+        several = dict.fromkeys(first[k] for k in those)
+        own = np.concatenate([np.arange(blocks[k].start, blocks[k].stop) for k in several])
         whole = self._whole(self.stacked)
         return deviate(*wald_statistic(np.concatenate(self.solution.free)[own], whole[np.ix_(own, own)]))
 
     def _spread_of(self, rows: Stacked) -> list[Array]:
-        whole = self._whole(rows)
-        return [whole[block, block] for block in self._blocks()]
+        whole, blocks = self._whole(rows), self._blocks()
+        each = [whole[blocks[k], blocks[k]] for k in leaders(self.effects, self.shapes)]
+        return [spread * shape.size**2 for spread, shape in zip(each, self.shapes, strict=True)]
 
     def _whole(self, rows: Stacked) -> Array:
         """Covariance of the free parameters of all effects."""
@@ -159,7 +205,7 @@ class Fit:
         return covariance(rows.X @ J, rows.y - rows.X @ beta, rows)
 
     def _blocks(self) -> list[slice]:
-        """Where each effect's are among them."""
+        """Where each effect's are among them; nowhere, where the first of those in proportion has them."""
         sizes = [len(own) for own in self.solution.free]
         return [slice(end - own, end) for own, end in zip(sizes, np.cumsum(sizes).tolist(), strict=True)]
 
@@ -172,7 +218,8 @@ class Fit:
     def score(self) -> Score:
         """What judges it."""
         rows = self.stacked
-        complexity = sum(effect.complexity for effect in self.effects)
+        first = leaders(self.effects, self.shapes)
+        complexity = sum(effect.complexity for k, effect in enumerate(self.effects) if first[k] == k)
         return Score.of(complexity, self.held_out, rows.joint, rows.block, rows.joints)
 
 
@@ -193,7 +240,7 @@ def fit(
         known: columns of all but the last effect, which are kept there for the next fit beside the same.
     """
     outside = []
-    problem = _Problem(evidence, residual, effects, {} if known is None else known)
+    problem = _Problem(evidence, residual, effects, shapes, {} if known is None else known)
     for k in range(FOLDS):
         judged, without = _solved(problem, [s.without[k] for s in shapes], k)
         outside.append(judged.y - judged.X @ without.beta)
@@ -241,19 +288,35 @@ class _Problem:
     """
 
     def __init__(
-        self, evidence: Evidence, residual: Array, effects: Sequence[Effect], known: Columns
+        self,
+        evidence: Evidence,
+        residual: Array,
+        effects: Sequence[Effect],
+        shapes: Sequence[Shape],
+        known: Columns,
     ) -> None:
         self.evidence, self.effects = evidence, effects
+        self.shapes, self._leaders = shapes, leaders(effects, shapes)
         self._residual, self._known = residual, known
         self._last: tuple[list[float], _Rows] | None = None
 
     def rows(self, values: Sequence[float]) -> _Rows:
         """The weighted rows at the effects' nonlinear parameters."""
         if self._last is None or self._last[0] != values:
-            columns = [self._columns(k, value) for k, value in enumerate(values)]
+            columns = self._joined([self._columns(k, value) for k, value in enumerate(values)])
             stacked = self.evidence.stack(self._residual, columns)
             self._last = list(values), _Rows(stacked, [c.shape[1] for c in columns])
         return self._last[1]
+
+    def _joined(self, columns: Sequence[Array]) -> list[Array]:
+        """The columns of each effect; of those in proportion their sum in the place of the first, none of the others."""
+        pairs = list(zip(columns, self.shapes, strict=True))
+        found = [x if shape.proportion is None else x[:, :0] for x, shape in pairs]
+        for k, (x, shape) in enumerate(pairs):
+            if shape.proportion is not None:
+                first = self._leaders[k]
+                found[first] = shape.size * x[:, :1] + (found[first] if found[first].shape[1] else 0.0)
+        return found
 
     def _columns(self, k: int, value: float) -> Array:
         if k == len(self.effects) - 1:
@@ -289,11 +352,14 @@ def _solved(problem: _Problem, values: Sequence[float], without: int | None) -> 
     values, effects, evidence = list(values), problem.effects, problem.evidence
     for attempt in range(REFINEMENTS + 1):
         rows = problem.rows(values)
-        judged = [_Judged(effect) for effect in effects]
+        pairs = list(zip(effects, problem.shapes, strict=True))
+        judged = [_Judged(effect) if s.proportion is None else Linear() for effect, s in pairs]
         beta, x, J = solve(rows.moments(without), judged, rows.sizes)
         better = [
-            _bounded(e, evidence, refined) if (refined := e.refined(free, value)) != value else value
-            for e, free, value in zip(effects, x, values, strict=True)
+            value
+            if s.proportion is not None or (refined := e.refined(free, value)) == value
+            else _bounded(e, evidence, refined)
+            for (e, s), free, value in zip(pairs, x, values, strict=True)
         ]
         if attempt == REFINEMENTS or better == values or np.allclose(better, values, rtol=1e-3):
             break

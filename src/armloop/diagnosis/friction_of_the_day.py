@@ -71,7 +71,7 @@ def of_the_day(
         pairs = zip(_KINDS, (roots[j] @ own).tolist(), strict=True)
         added += [_friction(name, j + 1, value) for name, value in pairs]
     day = Evidence.of(alone.with_effects(added), whole.samples, list(whole.asked))
-    return replace(day, whitening=Whitening(columns, memories, taken)), added
+    return replace(day, whitening=Whitening(columns, memories, taken, added)), added
 
 
 def of_that_day(model: ReconstructedModel, found: Diagnosis, friction: Sequence[AddedEffect]) -> Diagnosis:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,7 +24,7 @@ def with_growth(model: ReconstructedModel, found: Diagnosis) -> Diagnosis:
     Args:
         model: as it was made, with what was found in it before.
     """
-    said = of_growth(model, found.outcome.added())
+    said = of_growth(model, found.outcome.added(), found.outcome.growths().keys())
     return (
         replace(found, standing=replace(found.standing, reasons=[*found.standing.reasons, *said]))
         if said
@@ -32,19 +32,26 @@ def with_growth(model: ReconstructedModel, found: Diagnosis) -> Diagnosis:
     )
 
 
-def of_growth(model: ReconstructedModel, added: Sequence[AddedEffect]) -> list[str]:
-    """A sentence on each joint whose friction has changed; of parts that the model has, as its uncertainties state them."""
+def of_growth(
+    model: ReconstructedModel, added: Sequence[AddedEffect], whole: Collection[int] = ()
+) -> list[str]:
+    """A sentence on each joint whose friction has changed; of parts that the model has, as its uncertainties state them.
+
+    Args:
+        whole: joints (1-based) whose friction has grown as a whole, which says so where it is found.
+    """
     found = []
-    for joint in dict.fromkeys(a.effect.joint for a in added if a.effect.name in _PARTS):
+    of_parts = (a.effect.joint for a in added if a.effect.name in _PARTS and a.effect.joint not in whole)
+    for joint in dict.fromkeys(of_parts):
         assert joint is not None
         has = _parts(model, joint - 1)
         for a in model.effects:
             if a.effect.joint == joint and a.effect.name in has:
                 has[a.effect.name] += _size(a)
         own = [a for a in added if a.effect.joint == joint and has.get(a.effect.name, 0.0) > 0]
-        times = [f"{_PARTS[a.effect.name][1]} is {1 + _size(a) / has[a.effect.name]:.3g} times" for a in own]
-        if times:
-            found.append(f"joint {joint}: {', '.join(times)} what the model has")
+        parts = [f"{_PARTS[a.effect.name][1]} is {1 + _size(a) / has[a.effect.name]:.3g} times" for a in own]
+        if parts:
+            found.append(f"joint {joint}: {', '.join(parts)} what the model has")
     return found
 
 

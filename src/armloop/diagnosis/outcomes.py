@@ -16,7 +16,7 @@ from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import FREEDOM, SIGNIFICANCE, gain, is_worth, lead, times_enough
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Known
-from armloop.laws.effects import Effect
+from armloop.laws.effects import Effect, Estimate
 from armloop.model import AddedEffect
 from armloop.util.arrays import Mask
 
@@ -76,6 +76,11 @@ class Outcome:
         """The effects with their parameters, ready to be composed with the model."""
         return self.after.added()
 
+    def growths(self) -> dict[int, Estimate]:
+        """Of joints (1-based) whose friction has grown as a whole, by what part of what the model has."""
+        every = ((effect.joint, self.after.growth(k)) for k, effect in enumerate(self.after.effects))
+        return {joint: growth for joint, growth in every if joint is not None and growth is not None}
+
     @property
     def together(self) -> float:
         """The part of the explainable held-out energy that all effects remove."""
@@ -101,9 +106,20 @@ def known_with(evidence: Evidence, found: Sequence[Found]) -> Known:
     return recent[key]
 
 
+def goes_with(one: Found, other: Found) -> bool:
+    """Whether two are one hypothesis: the same effect, or effects of a joint in proportion to one another."""
+    in_proportion = None not in {one.shape.proportion, other.shape.proportion}
+    return one is other or (in_proportion and one.effect.joint == other.effect.joint)
+
+
 def others_than(found: Sequence[Found], k: int) -> list[Found]:
-    """All but one of the effects found."""
-    return [*found[:k], *found[k + 1 :]]
+    """All but one of the effects found, and what goes with it."""
+    return [f for f in found if not goes_with(f, found[k])]
+
+
+def hypotheses_of(found: Sequence[Found]) -> list[Effect]:
+    """The first effect of each hypothesis among those found."""
+    return [f.effect for k, f in enumerate(found) if not any(goes_with(f, other) for other in found[:k])]
 
 
 def _with_only(evidence: Evidence, outcome: Outcome, found: list[Found]) -> Outcome:
@@ -229,8 +245,8 @@ def outweighed(
 
 
 def without_effect(evidence: Evidence, outcome: Outcome, effect: Found) -> Outcome:
-    """The outcome without one of its effects; the others are fitted again."""
-    return _with_only(evidence, outcome, [f for f in outcome.found if f is not effect])
+    """The outcome without one of its effects, and what goes with it; the others are fitted again."""
+    return _with_only(evidence, outcome, [f for f in outcome.found if not goes_with(f, effect)])
 
 
 def without_effects_at(evidence: Evidence, outcome: Outcome, joint: int) -> Outcome:

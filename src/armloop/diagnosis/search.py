@@ -13,12 +13,23 @@ from itertools import chain, combinations
 import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.fit import Proportion, Shape
+from armloop.diagnosis.friction_as_a_whole import FRICTION, friction_of
 from armloop.diagnosis.judgement import MOST, SIGNIFICANCE, gain, lead, much_is_left
 from armloop.diagnosis.lasting import much_lasts
 from armloop.diagnosis.masking import masked, stand_in
 from armloop.diagnosis.one_way import one_way
-from armloop.diagnosis.outcomes import Found, Outcome, clear, gradual, known_with, others_than, pruned
+from armloop.diagnosis.outcomes import (
+    Found,
+    Outcome,
+    clear,
+    goes_with,
+    gradual,
+    hypotheses_of,
+    known_with,
+    others_than,
+    pruned,
+)
 from armloop.diagnosis.posterior import ALTERNATIVE, log_posterior
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import PROMISING, Hypotheses, Known, Tried
@@ -33,8 +44,6 @@ MOST_EFFECTS = 4
 _LEAST = 0.1
 #: Of so many effects, the likeliest, is each asked with a second one beside it, or in the place of two.
 _FIRST = 3
-#: A joint's friction, each of which is sought beside those before it.
-_FRICTION = ("coulomb_friction", "viscous_friction", "stribeck_friction")
 #: What depends on one another is found, or designed, in turn so many times.
 ROUNDS = 2
 
@@ -111,7 +120,7 @@ class _Search:
         outcome = replace(outcome, masked=(*hidden, *elsewhere))
         # What was barred beside others may be worth it, and clear, beside what is there now.
         self.barred = barred
-        value = log_posterior(self.evidence, outcome.after.score, [f.effect for f in outcome.found])
+        value = log_posterior(self.evidence, outcome.after.score, hypotheses_of(outcome.found))
         steps = [step for step in self._additions(outcome.found) if step[1][-1].effect in unclear]
         for likely, more in sorted(steps, key=lambda step: -step[0]):
             if likely > value + _LEAST and len((again := self._settled(more)).found) == len(more):
@@ -138,7 +147,7 @@ class _Search:
     def _gained(self, others: list[Found], f: Found) -> float:
         """Log posterior odds of an effect beside others, less the least that a step is worth."""
         without, beside = (
-            log_posterior(self.evidence, self._known(each).fit.score, [one.effect for one in each])
+            log_posterior(self.evidence, self._known(each).fit.score, hypotheses_of(each))
             for each in (others, [*others, f])
         )
         return beside - without - _LEAST
@@ -159,7 +168,7 @@ class _Search:
         for k in range(len(found)):
             others = others_than(found, k)
             current, _ = self._asked(others)
-            yield log_posterior(self.evidence, current, [f.effect for f in others]), others
+            yield log_posterior(self.evidence, current, hypotheses_of(others)), others
             yield from self._additions(others)
 
     def _pairs(self, found: list[Found], value: float) -> Iterator[tuple[float, list[Found]]]:
@@ -188,26 +197,47 @@ class _Search:
                 yield from self._two_for(found, [one], one.effect.indices, value)
         for pair in combinations(found, 2):
             joint = pair[0].effect.joint
-            if joint is not None and joint == pair[1].effect.joint:
+            if joint is not None and joint == pair[1].effect.joint and not goes_with(*pair):
                 yield from self._two_for(found, pair, (joint - 1,), value)
 
     def _whole_friction(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """Sets with a joint's Coulomb, viscous and Stribeck friction, Eq. (34), in the place of what rubs there.
 
-        Laws of friction are nearly alike: one that lies between two is found before either, and neither is worth it then
-        without the third.
+        Each by its own amount, or all by one factor. Laws of friction are nearly alike: one that lies between two is found
+        before either, and neither is worth it then without the third.
         """
         for joint in dict.fromkeys(f.effect.joint for f in found if f.effect.rubs):
-            every = [f for f in found if not (f.effect.rubs and f.effect.joint == joint)]
-            score = None
-            for one in (effect(name, joint) for name in _FRICTION):
-                trial = None if one.place in self.barred else self._known(every).trial(one)
-                if trial is None:
-                    break
-                score, every = trial.score, [*every, Found(one, trial.shapes[-1], 0.0)]
-            else:
-                if score is not None and len(_kinds(every)) <= self.most:
-                    yield log_posterior(self.evidence, score, [f.effect for f in every]), every
+            assert joint is not None
+            others = [f for f in found if not (f.effect.rubs and f.effect.joint == joint)]
+            for every in (self._each_its_own(others, joint), self._in_proportion(others, joint)):
+                if every and len(_kinds(every)) <= self.most:
+                    score = self._known(every).fit.score
+                    yield log_posterior(self.evidence, score, hypotheses_of(every)), every
+
+    def _each_its_own(self, found: list[Found], joint: int) -> list[Found]:
+        """These effects with all friction of a joint, each by its own amount; none where one of it cannot be."""
+        for one in (effect(name, joint) for name in FRICTION):
+            trial = None if one.place in self.barred else self._known(found).trial(one)
+            if trial is None:
+                return []
+            found = [*found, Found(one, trial.shapes[-1], 0.0)]
+        return found
+
+    def _in_proportion(self, found: list[Found], joint: int) -> list[Found]:
+        """These effects with all friction that a joint has, grown by one factor; none where one of it cannot have."""
+        more = [
+            Found(
+                effect(part.effect, joint),
+                Shape.fixed(part.velocity, Proportion(part.size, part.std_error)),
+                0.0,
+            )
+            for part in friction_of(self.evidence, joint - 1)
+        ]
+        if len(more) < 2 or any(f.effect.place in self.barred for f in more):
+            return []
+        every = [*found, *more]
+        fitted = self._known(every).fit
+        return every if all(fitted.is_possible(k, [f.shape.final]) for k, f in enumerate(every)) else []
 
     def _two_for(
         self, found: list[Found], some: Sequence[Found], joints: Sequence[int], value: float
@@ -232,7 +262,7 @@ class _Search:
 
     def _additions(self, found: list[Found], least: float = PROMISING) -> Iterator[tuple[float, list[Found]]]:
         """Sets with one effect more, with their log posteriors, but for those that are less likely by ``least``."""
-        there = [f.effect for f in found]
+        there = hypotheses_of(found)
         for trial in self._asked(found, least)[1] if len(_kinds(found)) < self.most else []:
             value = log_posterior(self.evidence, trial.score, [*there, trial.effect])
             yield value, [*found, Found(trial.effect, trial.shape, 0.0)]
@@ -274,7 +304,7 @@ class _Search:
 
 
 def _kinds(found: Sequence[Found]) -> set[str]:
-    return {f.effect.name for f in found}
+    return {effect.name for effect in hypotheses_of(found)}
 
 
 def _are_needed(unclear: Sequence[Effect], together: Outcome, others: Outcome) -> bool:

@@ -37,7 +37,15 @@ from armloop.diagnosis.law_selection import (
     library_of,
     names_of,
 )
-from armloop.diagnosis.outcomes import Found, Outcome, pruned, refitted, with_effects, without_effects_at
+from armloop.diagnosis.outcomes import (
+    Found,
+    Outcome,
+    hypotheses_of,
+    pruned,
+    refitted,
+    with_effects,
+    without_effects_at,
+)
 from armloop.diagnosis.posterior import log_prior, told
 from armloop.diagnosis.reasons import part_of_a_law
 from armloop.diagnosis.score import Score
@@ -223,7 +231,7 @@ def _is_simpler(evidence: Evidence, law: Law, outcome: Outcome, bare: Outcome, j
 
     With fewer parameters it need but be likelier. A law of listed effects was the search's to find.
     """
-    there = [f.effect for f in outcome.found if f not in bare.found]
+    there = hypotheses_of([f for f in outcome.found if f not in bare.found])
     parameters = sum(effect.complexity for effect in there)
     if law.is_listed(j) or not 0 < len(law.terms) <= parameters:
         return False
@@ -237,7 +245,7 @@ def _is_far_likelier(evidence: Evidence, law: Law, outcome: Outcome, bare: Outco
 
     It is asked where what they leave is real, and is no law: a stop is near any torque that grows to one side.
     """
-    there = [f.effect for f in outcome.found if f not in bare.found]
+    there = hypotheses_of([f for f in outcome.found if f not in bare.found])
     named = outcome.after.score
     if not law.terms or law.is_listed(j) or not _leaves_far_less(law.score, named.of_joint(j)):
         return False

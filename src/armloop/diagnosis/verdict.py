@@ -153,8 +153,10 @@ class Diagnosis:
         """The content of ``diagnosis.json``."""
         effects: list[dict[str, Any]] = []
         every = zip(self.outcome.found, self.outcome.added(), self.strengths, strict=True)
+        growths = self.outcome.growths()
         for found, added, strength in every:
             onset = added.effect.onset
+            growth = None if found.shape.proportion is None else growths.get(found.effect.joint or 0)
             effects.append(
                 {
                     **added.to_dict(),
@@ -165,6 +167,7 @@ class Diagnosis:
                     if listed(found.effect)
                     else None,
                     "strength": strength.to_dict(),
+                    **({} if growth is None else {"growth": growth.to_dict()}),
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.sentence(),
                     "sensor": added.effect.sensor,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armloop.diagnosis.outcomes import goes_with
 from armloop.diagnosis.pushes import FEW
 from armloop.diagnosis.whereabouts import whereabouts
+from armloop.laws.effects.base import number
 from armloop.laws.effects.time_delay import TimeDelay
 from armloop.laws.effects.torque_gain import TorqueGain
 from armloop.reports.prose import Prose
@@ -15,9 +18,10 @@ from armloop.reports.words import counted, effect_label, from_to, listed, percen
 from armloop.reports.words import joints as of_joints
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from armloop.diagnosis import Diagnosis
+    from armloop.diagnosis.outcomes import Found, Outcome
     from armloop.laws.effects import Effect
     from armloop.model import AddedEffect
 
@@ -41,10 +45,7 @@ def findings(diagnosis: Diagnosis) -> list[str]:
     outcome, joints = diagnosis.outcome, diagnosis.model.arm.joints
     turned = [] if diagnosis.reversals is None else diagnosis.reversals.found
     values: dict[str, object] = {
-        "effects": [
-            (unit(added.sentence()), found, found in turned)
-            for found, added in zip(outcome.found, outcome.added(), strict=True)
-        ],
+        "effects": [(unit(sentence), found, found in turned) for sentence, found in _sentences(outcome)],
         "together": _together(diagnosis),
         "contacts": diagnosis.contacts,
         "events": _events(diagnosis),
@@ -63,6 +64,26 @@ def findings(diagnosis: Diagnosis) -> list[str]:
         "adopted": diagnosis.adopted,
     }
     return Prose("findings", **values).paragraphs("findings") or [_nothing(diagnosis)]
+
+
+def _sentences(outcome: Outcome) -> Iterator[tuple[str, Found]]:
+    """What was found, a sentence each; one for all of a joint's friction that has grown as a whole."""
+    growths, pairs = outcome.growths(), list(zip(outcome.found, outcome.added(), strict=True))
+    for k, (found, added) in enumerate(pairs):
+        if added.effect.joint is None or found.shape.proportion is None:
+            yield added.sentence(), found
+        elif not any(goes_with(found, other) for other, _ in pairs[:k]):
+            growth = growths[added.effect.joint]
+            times = replace(growth, value=1 + number(growth.value)).words()
+            parts = [
+                f"{effect_label(each.effect).split(',')[0]} by {next(iter(each.parameters.values())).words()}"
+                for other, each in pairs
+                if goes_with(found, other)
+            ]
+            yield (
+                f"all friction of joint {added.effect.joint} is {times} times what the model has, {listed(parts)}",
+                found,
+            )
 
 
 def _together(diagnosis: Diagnosis) -> float | None:

@@ -48,10 +48,19 @@ class SpellsData(Struct):
     log: list[Name] = []
 
 
+class GrowthData(Struct):
+    """What all friction of a joint has grown by, in parts of what the model has."""
+
+    value: Finite
+    std_error: NotNegative
+    unit: Literal["1"]
+
+
 class FoundData(Struct):
     """An effect that was found, or the law of a residual that no listed effect explains.
 
-    One that is not there all the while has ``since``, from which instant on it is there, or ``until``, or ``during``.
+    One that is not there all the while has ``since``, from which instant on it is there, or ``until``, or ``during``. A part
+    of a joint's friction that has grown as a whole has ``growth``, and its share is that of all parts.
     """
 
     effect: Name
@@ -68,6 +77,7 @@ class FoundData(Struct):
     since: OnsetData | UnsetType = UNSET
     until: OnsetData | UnsetType = UNSET
     during: SpellsData | UnsetType = UNSET
+    growth: GrowthData | UnsetType = UNSET
 
 
 class RemainsData(Struct):
