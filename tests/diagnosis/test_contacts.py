@@ -175,7 +175,7 @@ class TestFinding:
             lambda evidence, residual, one: not one.rows[list(of.get("erring", ()))].any(),
         )
         monkeypatch.setattr(contacts, "turning", lambda motion, moving: np.arange(200).reshape(100, 2) < 60)
-        monkeypatch.setattr(contacts, "at_rest", lambda samples: np.arange(200).reshape(100, 2) >= 180)
+        monkeypatch.setattr(contacts, "at_rest", lambda samples, model: np.arange(200).reshape(100, 2) >= 180)
         monkeypatch.setattr(contacts, "outlying", lambda evidence, residual: [slice(10, 20), slice(60, 70)])
         monkeypatch.setattr(contacts, "push", push)
         monkeypatch.setattr(contacts, "torque_on", lambda *given: push(*given[:-1], [given[-1]]))

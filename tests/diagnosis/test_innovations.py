@@ -10,7 +10,7 @@ from stretches import motion, steps
 from armloop.data.creep import STICKING as CREEP
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import innovations
-from armloop.diagnosis.innovations import at_rest
+from armloop.diagnosis.standstill import at_rest
 from armloop.util.errors import ModelError
 
 
@@ -29,6 +29,10 @@ def of_samples(given: Any) -> Any:
     return SimpleNamespace(samples=given, model=SimpleNamespace(history={}, arm=SimpleNamespace(n=joints)))
 
 
+def resting(given: Any) -> Any:
+    return at_rest(given.samples, given.model)
+
+
 def test_a_joint_that_never_crept_may_stick_at_more_than_its_sliding_level() -> None:
     def of(**history: Any) -> list[float]:
         model: Any = SimpleNamespace(history=history, arm=SimpleNamespace(n=3))
@@ -45,11 +49,11 @@ def test_a_fast_reversal_is_no_rest_and_a_standstill_is() -> None:
     near = (
         np.abs(np.arange(200) - 99.5) <= 10.5
     )  # the samples whose torque the filter has mixed with the standstill's
-    assert at_rest(of_samples(samples(turning, ~near))).sum() <= 2 < near.sum()
+    assert resting(of_samples(samples(turning, ~near))).sum() <= 2 < near.sum()
     standing = np.concatenate([np.linspace(2.0, 0.0, 100), np.zeros(100), np.linspace(0.0, 2.0, 100)])
     still = np.zeros(300, dtype=bool)
     still[90:210] = True
-    rest = at_rest(of_samples(samples(standing, ~still)))[:, 0]
+    rest = resting(of_samples(samples(standing, ~still)))[:, 0]
     assert rest[100:200].all() and not rest[:98].any() and not rest[202:].any()
     assert np.abs(standing[rest]).max() <= 2 * CREEP + 0.02
 
@@ -67,18 +71,18 @@ def test_a_standstill_as_long_as_what_the_filter_smears_to_both_sides_is_a_rest_
     rest = np.zeros((N, 2), dtype=bool)
     # neither a run's beginning nor its end is a motion
     rest[[*range(20, 25), *range(60, 70), *range(115, 120)], 0] = rest[92:94, 1] = True
-    np.testing.assert_array_equal(at_rest(of_samples(given)), rest)
+    np.testing.assert_array_equal(resting(of_samples(given)), rest)
     # without a filter nothing is smeared, and slower than a creep a joint rests
     v[0], v[1], v[2] = CREEP, -0.99 * CREEP, 0.99 * CREEP
     moving[:3] = True
     rest = ~moving
     rest[1:3] = True
     bare = of_samples(Samples(motion, 0 * v, moving, 0.01))
-    np.testing.assert_array_equal(at_rest(bare), rest)
+    np.testing.assert_array_equal(resting(bare), rest)
     # a joint that never went faster than a twentieth of this in training is not at rest there
     bare.model.history = {"range": [[1.0, 1.0], [10 * CREEP, 20 * CREEP], [1.0, 1.0], [0.0, 0.0]]}
     rest[1:3, 0] = False
-    np.testing.assert_array_equal(at_rest(bare), rest)
+    np.testing.assert_array_equal(resting(bare), rest)
 
 
 def at_speeds(v: list[float], starts: tuple[int, ...] = (0,), **of: Any) -> Any:
@@ -125,7 +129,7 @@ class TestInnovations:
         level = 1.0 + len(known)
         monkeypatch.setattr(innovations, "dry_level", lambda e, known: np.full((len(v), 1), level))
         monkeypatch.setattr(innovations, "shared_dry", lambda e, known, slow: of.get("shared", 0.0))
-        monkeypatch.setattr(innovations, "at_rest", lambda samples: np.array(rest)[:, None])
+        monkeypatch.setattr(innovations, "at_rest", lambda samples, model: np.array(rest)[:, None])
         monkeypatch.setattr(innovations, "deviations", lambda evidence, residual: 0 * residual + 2.0)
         values, rests = innovations.innovations(evidence, np.array(residual)[:, None], known)
         assert rests[:, 0].tolist() == rest
@@ -370,8 +374,8 @@ class TestPieces:
         moving[50:] = False
         moving[75] = True
         samples: Any = SimpleNamespace(motion=given, moving=moving, period=0.01, reach=0.03, cutoff_hz=5.0)
-        rest = np.flatnonzero(at_rest(of_samples(samples))).tolist()
+        rest = np.flatnonzero(resting(of_samples(samples))).tolist()
         assert rest == [*range(13, 28), *range(53, 72), *range(79, 100)]
         samples.cutoff_hz = 0.0
-        rest = np.flatnonzero(at_rest(of_samples(samples))).tolist()
+        rest = np.flatnonzero(resting(of_samples(samples))).tolist()
         assert rest == [*range(10, 31), *range(50, 75), *range(76, 100)]

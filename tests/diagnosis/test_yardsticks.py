@@ -12,6 +12,7 @@ import pytest
 from armloop.data.blocks import halves
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import evidence as evidences
+from armloop.diagnosis import standstill
 from armloop.diagnosis.evidence import Evidence, Stacked
 from armloop.diagnosis.fit import Fit, Shape, Solution
 from armloop.diagnosis.judgement import (
@@ -96,8 +97,8 @@ def test_what_lies_far_outside_the_trained_range_is_not_judged() -> None:
 
 
 def test_a_joint_creeps_below_a_hundredth_of_its_trained_speed() -> None:
-    assert evidences.creep(a_model(range=[[1, 1], [2.0, 3.0], [1, 1], [0, 0]])).tolist() == [0.02, 0.03]
-    assert evidences.creep(a_model()).tolist() == [1e-3, 1e-3]
+    assert standstill.creep(a_model(range=[[1, 1], [2.0, 3.0], [1, 1], [0, 0]])).tolist() == [0.02, 0.03]
+    assert standstill.creep(a_model()).tolist() == [1e-3, 1e-3]
 
 
 @pytest.mark.parametrize(
@@ -176,6 +177,7 @@ def test_a_model_without_a_baseline_is_weighed_by_the_torque() -> None:
             context=lambda motion, effects: context,
             arm=SimpleNamespace(n=2),
             effects=(),
+            predict=lambda motion: 0 * motion.q,
         )
         return Evidence.of(model, given, [])
 

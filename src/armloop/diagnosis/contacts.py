@@ -14,13 +14,14 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
-from armloop.diagnosis.evidence import Evidence, creep, far_outside, near_standstill
-from armloop.diagnosis.innovations import at_rest, averaged, deviations, dry_level, innovations
+from armloop.diagnosis.evidence import Evidence, far_outside
+from armloop.diagnosis.innovations import averaged, deviations, dry_level, innovations
 from armloop.diagnosis.judgement import FREEDOM, MOSTLY, MULTIPLE, SIGNIFICANCE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import FEW, PAUSE, SHORTEST, Contact, around, push, torque_on
 from armloop.diagnosis.recurrence import comes_back, rubs, within
+from armloop.diagnosis.standstill import at_rest, creep, near_standstill
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect
 from armloop.util.arrays import TINY, Array, Index, Mask
@@ -79,7 +80,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
         tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
         bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
-    holds = turning(motion, evidence.samples.moving) | at_rest(evidence)
+    holds = turning(motion, evidence.samples.moving) | at_rest(evidence.samples, evidence.model)
     bursts = _rare(evidence.rows, bursts)
 
     def counted(burst: Burst, others: Sequence[Burst]) -> Mask:

@@ -15,10 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves, widened
-from armloop.data.creep import TRAVEL, may_stick
+from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves
+from armloop.data.creep import TRAVEL
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
+from armloop.diagnosis.standstill import mixed_in, near_standstill, sticking
 from armloop.identification.scoring import filtered_context, residual, too_slow
 from armloop.identification.shared_motors import without_shared_standstill
 from armloop.identification.uncertainty import friction_spread, torque_errors
@@ -35,8 +36,6 @@ from armloop.util.interpolation import cubic_nodes
 FOLDS = 2
 #: The shortest block, s, lies between these, so that the model's residual remembers no more than this part of it.
 _SHORTEST, _REMEMBERED = (0.75, 1.0), 0.1
-#: Below this part of its largest speed a joint may be at rest, pushed about within its friction.
-STILL = 0.01
 #: A joint is not judged if less than this part of the samples in which it turns counts, and fewer than so many: of one that
 #: turns round as soon as the filter has settled, a law would be fitted to a few moments of its fastest swings.
 _SELDOM, _ENOUGH = 0.05, 100
@@ -158,6 +157,7 @@ class Evidence:
         rows = sliding(samples, model)
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples)
         rows &= ~samples.at_an_end[:, None]
+        rows &= ~mixed_in(model, samples, scale, rows)
         rows &= ~seldom(model, samples, rows)
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(
@@ -352,23 +352,6 @@ class Evidence:
         return self.blocks[samples], self.fold[samples], joints, self.rows.shape[1], cells, self._model_errors
 
 
-def creep(model: ReconstructedModel) -> Array:
-    """(n,) speed of each joint, rad/s (m/s), below which it is pushed about within its friction and has not moved."""
-    ranges = model.history.get("range")
-    return STILL * np.asarray(ranges[1]) if ranges else np.full(model.arm.n, 1e-3)
-
-
-def fastest(model: ReconstructedModel) -> Array:
-    """(n,) largest speed of each joint that the model was trained at, rad/s (m/s); infinite where nobody knows."""
-    ranges = model.history.get("range")
-    return np.asarray(ranges[1], dtype=float) if ranges else np.full(model.arm.n, np.inf)
-
-
-def sticking(model: ReconstructedModel) -> Array:
-    """(n,) speed of each joint, rad/s (m/s), below which it may stick; the level of its friction is that at this speed."""
-    return may_stick(fastest(model))
-
-
 def far_outside(motion: Motion, ranges: Any) -> Mask:
     """(N, n) samples in which a joint's q, v or vdot lies so far beyond the trained range that nothing is judged there."""
     if not ranges:
@@ -382,11 +365,6 @@ def seldom(model: ReconstructedModel, samples: Samples, rows: Mask) -> Mask:
     """(n,) joints of which, of all samples in which they turn, so few count (N, n) that these may be anything of a turn."""
     turns = (np.abs(samples.motion.v) > sticking(model)) & independent_rows(samples)[:, None]
     return np.asarray(rows.sum(axis=0) < np.minimum(_ENOUGH, _SELDOM * turns.sum(axis=0)))
-
-
-def near_standstill(samples: Samples) -> Mask:
-    """(N, n) samples within the filter's reach of one in which a joint does not count as moving."""
-    return widened(~samples.moving, samples.motion, round(samples.reach / samples.period))
 
 
 def sliding(samples: Samples, model: ReconstructedModel) -> Mask:

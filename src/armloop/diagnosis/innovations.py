@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from armloop.data.blocks import widened
 from armloop.data.creep import CREEPING, STICKING
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
-from armloop.diagnosis.evidence import Evidence, fastest, sticking
+from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
+from armloop.diagnosis.standstill import at_rest, fastest, sticking
 from armloop.dynamics import Dynamics, ModelEquations
 from armloop.identification.scoring import too_slow
 from armloop.laws.friction import Direction
@@ -45,7 +45,7 @@ def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect
     """
     samples, model = evidence.samples, evidence.model
     motion = samples.motion
-    rest = at_rest(evidence)
+    rest = at_rest(samples, model)
     # Where sliding takes more than the model says, so does sticking.
     sliding_more = [
         float(np.median((np.sign(motion.v[:, j]) * residual[:, j])[evidence.rows[:, j]]))
@@ -81,16 +81,6 @@ def stiction(model: ReconstructedModel) -> Array:
     """(n,) how many times its sliding level a joint at rest can hold: more, where it never crept in its training."""
     slowest = np.asarray(model.history.get("slowest") or 0.0)
     return np.where(slowest > CREEPING * fastest(model), 1 + _UNSURE, _STICTION)
-
-
-def at_rest(evidence: Evidence) -> Mask:
-    """(N, n) whether a joint stands still; around a standstill the filter has smeared only its torque."""
-    samples = evidence.samples
-    rest = ~samples.moving
-    reach = max(1, round(samples.reach / samples.period)) if samples.cutoff_hz > 0 else 0
-    if reach:
-        rest = ~widened(samples.moving, samples.motion, reach)
-    return np.asarray(rest | (np.abs(samples.motion.v) < sticking(evidence.model)))
 
 
 def averaged(samples: Samples, values: Array) -> Array:

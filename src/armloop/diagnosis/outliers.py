@@ -10,9 +10,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from armloop.data.motion import Motion
-from armloop.diagnosis.evidence import Evidence, sticking
+from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import dry_level
 from armloop.diagnosis.pushes import PAUSE, around
+from armloop.diagnosis.standstill import sticking
 from armloop.util.arrays import Array
 
 #: Over this many seconds the residual is averaged; shorter bursts are none, as those closer than PAUSE are one.

@@ -13,14 +13,13 @@ from armloop.diagnosis.evidence import (
     FAR,
     FEWEST_BLOCKS,
     Evidence,
-    creep,
     far_outside,
     seldom,
     shortest_block,
     sliding,
-    sticking,
 )
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE
+from armloop.diagnosis.standstill import creep, mixed_in, sticking
 from armloop.features.lagrangian import constant_weights
 from armloop.identification.goodness import (
     WORTH_A_WORD,
@@ -98,7 +97,8 @@ def standing(
     far = strays.mean(axis=0)
     slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
     slides = sliding(samples, model)
-    few = seldom(model, samples, slides & ~strays & ~creeps)
+    rows = slides & ~strays & ~creeps
+    few = seldom(model, samples, rows & ~mixed_in(model, samples, evidence.scale, rows))
     reasons = [*_outside(outside, far), *_slow(model, samples, slow)]
     unknown, unexplained, judged, rough = False, [], 0, []
     multiples: list[bool | None] = []

@@ -20,12 +20,13 @@ from armloop.diagnosis.account import Account
 from armloop.diagnosis.beside import account_beside, at_the_cost_of_others, known_by, known_part, merged
 from armloop.diagnosis.change_points import courses, instant_price
 from armloop.diagnosis.contacts import without
-from armloop.diagnosis.evidence import Evidence, near_standstill
+from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import MOSTLY, much_is_left
 from armloop.diagnosis.onset import log_name, posterior
 from armloop.diagnosis.outcomes import Found
 from armloop.diagnosis.search import ROUNDS
+from armloop.diagnosis.standstill import near_standstill
 from armloop.diagnosis.trials import Known
 from armloop.diagnosis.two_states import intervals_of, likeliest, two_states, worth
 from armloop.laws.effects import Effect, hypotheses
