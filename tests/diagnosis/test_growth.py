@@ -64,6 +64,21 @@ def test_other_effects_are_no_growth() -> None:
     assert both == ["joint 1: dry friction is 0.5 times what the model has"]
 
 
+def test_friction_with_memory_is_dry_friction_once_it_slides() -> None:
+    known = model([{}, law(coulomb=4.0)])
+    memory = added("presliding_hysteresis", 2, level=1.0, width=0.001, level_change=1.5)
+    assert of_growth(known, [memory]) == ["joint 2: dry friction is 1.62 times what the model has"]
+    assert of_growth(known, [memory, added("coulomb_friction", 2, level=1.5)]) == [
+        "joint 2: dry friction is 2 times what the model has"
+    ]
+    # what only turns a step into a memory is no growth
+    turned = added("presliding_hysteresis", 2, level=1.0, width=0.001, level_change=-1.0)
+    assert of_growth(known, [turned]) == []
+    said = memory.sentence()
+    assert "2.5 N" not in said and said.endswith("2.5  more dry friction once it slides")
+    assert "more dry" not in added("presliding_hysteresis", 2, level=1.0, width=0.001).sentence()
+
+
 def test_what_was_found_before_is_part_of_what_the_model_has() -> None:
     before = (
         added("coulomb_friction", 2, level=3.0),

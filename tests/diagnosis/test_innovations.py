@@ -10,7 +10,7 @@ from stretches import motion, steps
 from armloop.data.creep import STICKING as CREEP
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import innovations
-from armloop.diagnosis.standstill import at_rest
+from armloop.identification.standstill import at_rest
 from armloop.util.errors import ModelError
 
 

@@ -223,6 +223,9 @@ class TestReasons:
         monkeypatch.setattr(reasons, "too_slow", lambda model, samples: np.zeros((50, 3), dtype=bool))
         monkeypatch.setattr(reasons, "sliding", lambda samples, model: slides)
         monkeypatch.setattr(reasons, "seldom", lambda model, samples, rows: np.arange(3) == of.get("seldom"))
+        monkeypatch.setattr(
+            reasons, "mixed_in", lambda model, samples, left, scale, rows: np.zeros_like(rows)
+        )
         monkeypatch.setattr(reasons, "sharing", lambda model, j: of.get("shares", []))
         monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
         monkeypatch.setattr(

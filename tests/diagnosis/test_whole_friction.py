@@ -267,20 +267,40 @@ EQUATION_34 = terms(("sign", 2.0, 0.0), ("viscous", 3.0, 0.0), ("stribeck_peak",
         (EQUATION_34, [given("coulomb_friction", level=-0.5)], [1.5, 3.0, 1.0]),
         (EQUATION_34, [given("viscous_friction", coefficient=2.0)], [2.0, 5.0, 1.0]),
         (EQUATION_34, [given("stribeck_friction", static_excess=1.0, velocity=0.1)], [2.0, 3.0, 2.0]),
-        # falls at two speeds are no one law
-        (EQUATION_34, [given("stribeck_friction", static_excess=1.0, velocity=0.2)], []),
-        (EQUATION_34, [given("quadratic_drag", coefficient=1.0)], []),
+        # of falls at two speeds the larger tells where
+        (EQUATION_34, [given("stribeck_friction", static_excess=0.5, velocity=0.2)], [2.0, 3.0, 1.5]),
+        (EQUATION_34, [given("quadratic_drag", coefficient=1.0)], [2.0, 3.0, 1.0, 1.0]),
+        (
+            terms(
+                ("sign", 2.0, 0.0),
+                ("viscous", 3.0, 0.0),
+                ("stribeck_peak", 1.0, 0.1),
+                ("quadratic", 4.0, 0.0),
+            ),
+            [],
+            [2.0, 3.0, 1.0, 4.0],
+        ),
+        # a rise from the static level
+        (terms(("sign", 3.0, 0.0), ("viscous", 3.0, 0.0), ("stribeck", -1.0, 0.1)), [], [2.0, 3.0, 1.0]),
+        (
+            terms(("sign", 2.0, 0.0), ("viscous_forward", 4.0, 0.0), ("viscous_backward", 2.0, 0.0)),
+            [],
+            [2.0, 3.0],
+        ),
+        (terms(("sign", 2.0, 0.0), ("offset", 9.0, 0.0)), [], [2.0]),
+        (terms(("sign", 2.0, 0.0), ("cubic", 9.0, 0.0)), [], []),
+        (EQUATION_34, [given("friction_asymmetry", level=1.0)], []),
+        (EQUATION_34, [given("coulomb_friction", level=-2.5)], []),
         # an inertia rubs nowhere
         (EQUATION_34, [given("rotor_inertia", inertia=1.0)], [2.0, 3.0, 1.0]),
-        (terms(("viscous", 3.0, 0.0)), [], []),
         (terms(), [], []),
     ],
 )
 def test_what_a_joint_has_is_all_that_slides(law: FrictionLaw, effects: Any, wanted: list[float]) -> None:
     parts = friction_of(known_of(law, *effects), 0)
     assert [part.size for part in parts] == pytest.approx(wanted)
-    assert [part.effect for part in parts] == list(LAWS[: len(wanted)])
-    assert [part.velocity for part in parts] == [0.0, 0.0, 0.1][: len(wanted)]
+    assert [part.effect for part in parts] == [*LAWS, "quadratic_drag"][: len(wanted)]
+    assert [part.velocity for part in parts] == [0.0, 0.0, 0.1, 0.0][: len(wanted)]
     assert not any(part.std_error for part in parts)
 
 
@@ -289,6 +309,14 @@ def test_a_fall_that_the_model_was_given_is_the_joints() -> None:
     fallen = given("stribeck_friction", static_excess=1.0, velocity=0.2)
     assert friction_of(known_of(plain, fallen), 0)[-1][:2] == ("stribeck_friction", 1.0)
     assert friction_of(known_of(plain, fallen), 0)[-1].velocity == 0.2
+
+
+def test_what_grows_with_the_load_is_a_part() -> None:
+    law = terms(("sign", 2.0, 0.0), ("load_smooth_sign", 0.1, 0.01), ("load_hysteresis", 0.05, 0.001))
+    assert [tuple(part) for part in friction_of(known_of(law), 0)] == [
+        ("coulomb_friction", 2.0, 0.0, 0.0),
+        ("load_dependent_friction", pytest.approx(0.15), 0.0, 0.0),
+    ]
 
 
 def test_friction_of_the_day_is_beside_it() -> None:

@@ -12,7 +12,6 @@ import pytest
 from armloop.data.blocks import halves
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import evidence as evidences
-from armloop.diagnosis import standstill
 from armloop.diagnosis.evidence import Evidence, Stacked
 from armloop.diagnosis.fit import Fit, Shape, Solution
 from armloop.diagnosis.judgement import (
@@ -23,6 +22,7 @@ from armloop.diagnosis.judgement import (
     lead_of,
     times_enough,
 )
+from armloop.identification import standstill
 
 NOTHING = Solution(np.zeros(0), (), np.zeros((0, 0)), ())
 

@@ -21,7 +21,8 @@ from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import FEW, PAUSE, SHORTEST, Contact, around, push, torque_on
 from armloop.diagnosis.recurrence import comes_back, rubs, within
-from armloop.diagnosis.standstill import at_rest, creep, near_standstill
+from armloop.identification.goodness import trained_range
+from armloop.identification.standstill import at_rest, creep, near_standstill
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect
 from armloop.util.arrays import TINY, Array, Index, Mask
@@ -212,7 +213,7 @@ def _unlike(
     motion = evidence.samples.motion
     innovation, rest = innovations(evidence, residual, found)
     held = np.abs(innovation) * deviations(evidence, residual) / np.maximum(dry_level(evidence, found), TINY)
-    far = far_outside(motion, evidence.model.history.get("range"))
+    far = far_outside(motion, trained_range(evidence.model))
     rows, new = novelty(evidence, innovation, rest)
     new = np.where(known[rows][:, None], 0.0, new)
     level, mean = np.abs(new), averaged(evidence.samples, innovation)[rows]

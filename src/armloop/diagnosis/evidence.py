@@ -19,9 +19,10 @@ from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves
 from armloop.data.creep import TRAVEL
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
-from armloop.diagnosis.standstill import mixed_in, near_standstill, sticking
+from armloop.identification.goodness import trained_range
 from armloop.identification.scoring import filtered_context, residual, too_slow
 from armloop.identification.shared_motors import without_shared_standstill
+from armloop.identification.standstill import mixed_in, near_standstill, sticking
 from armloop.identification.uncertainty import friction_spread, torque_errors
 from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.base import Place
@@ -155,9 +156,9 @@ class Evidence:
         context = filtered_context(model, samples, effects)
         samples = without_shared_standstill(samples, model, scale)
         rows = sliding(samples, model)
-        rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples)
+        rows &= ~far_outside(samples.motion, trained_range(model)) & ~too_slow(model, samples)
         rows &= ~samples.at_an_end[:, None]
-        rows &= ~mixed_in(model, samples, scale, rows)
+        rows &= ~mixed_in(model, samples, residual(model, samples), scale, rows)
         rows &= ~seldom(model, samples, rows)
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(
@@ -354,7 +355,7 @@ class Evidence:
 
 def far_outside(motion: Motion, ranges: Any) -> Mask:
     """(N, n) samples in which a joint's q, v or vdot lies so far beyond the trained range that nothing is judged there."""
-    if not ranges:
+    if ranges is None or not len(ranges):
         return np.zeros(motion.q.shape, dtype=bool)
     half, v, vdot, centre = np.asarray(ranges, dtype=float)
     parts = [(motion.q - centre, half), (motion.v, v), (motion.vdot, vdot)]

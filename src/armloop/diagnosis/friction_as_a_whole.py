@@ -15,6 +15,21 @@ from armloop.laws.effects.base import number
 from armloop.model import ReconstructedModel
 
 COULOMB, VISCOUS, STRIBECK = FRICTION = ("coulomb_friction", "viscous_friction", "stribeck_friction")
+DRAG, BY_LOAD = "quadratic_drag", "load_dependent_friction"
+#: Kinds of friction terms that are parts of an effect: a level while it slides, whatever comes before that; a fall; …
+_PARTS = {
+    "viscous": VISCOUS,
+    "viscous_forward": VISCOUS,
+    "viscous_backward": VISCOUS,
+    "stribeck_peak": STRIBECK,
+    "quadratic": DRAG,
+    "sign": COULOMB,
+    "smooth_sign": COULOMB,
+    "hysteresis": COULOMB,
+    "load_sign": BY_LOAD,
+    "load_smooth_sign": BY_LOAD,
+    "load_hysteresis": BY_LOAD,
+}
 
 
 class Part(NamedTuple):
@@ -27,27 +42,38 @@ class Part(NamedTuple):
 
 
 def friction_of(evidence: Evidence, j: int) -> list[Part]:
-    """What a joint (0-based) that slides has of Coulomb, viscous and Stribeck friction; nothing where its law is another.
+    """What a joint (0-based) that slides has of each law of friction; nothing where one of its terms is of none.
 
-    Effects that the model was given are parts of it, but not friction of the day, which is beside what has grown.
+    Of falls at several velocities all are taken to be where the largest is. Effects that the model was given are parts of
+    it, but not friction of the day, which is beside what has grown.
     """
     model, whitening = evidence.model, evidence.whitening
-    sums = model.friction.sliding_sums(j)
-    if not sums:
-        return []
-    law = {key: sum(t.share * t.coefficient for t in terms) for key, terms in sums.items()}
-    level, velocity = law["coulomb"], model.friction.stribeck_velocity(j) if "static" in law else 0.0
-    has = {COULOMB: level, VISCOUS: law.get("viscous", 0.0), STRIBECK: law.get("static", level) - level}
+    has, falls = dict.fromkeys((*FRICTION, DRAG, BY_LOAD), 0.0), {0.0: 0.0}
+    for term in model.friction.terms[j]:
+        size = term.share * term.coefficient
+        if term.kind == "stribeck":  # a rise from a level that is the static one
+            has[COULOMB] += size
+        kind = STRIBECK if term.kind == "stribeck" else _PARTS.get(term.kind)
+        if kind is not None:
+            has[kind] += -size if term.kind == "stribeck" else size
+        elif term.element.part == "friction" and term.kind != "offset":
+            return []
+        if kind == STRIBECK:
+            falls[term.parameter] = falls.get(term.parameter, 0.0) + abs(size)
     for added in model.effects:
         effect = added.effect
         of_the_day = whitening is not None and whitening.are(added)
         if not effect.rubs or effect.joint != j + 1 or of_the_day:
             continue
-        own = number(added.parameters["velocity"].value) if effect.name == STRIBECK else velocity
-        if effect.name not in has or velocity not in {0.0, own}:
+        if effect.name not in has:
             return []
-        velocity = own
-        has[effect.name] += number(added.parameters[effect.parameters[0].name].value)
+        size = number(added.parameters[effect.parameters[0].name].value)
+        has[effect.name] += size
+        if effect.name == STRIBECK:
+            falls[number(added.parameters["velocity"].value)] = abs(size)
+    if min(has.values()) < 0:
+        return []
+    velocity = max(falls, key=falls.__getitem__)
     errors = _errors(model, j)
     return [
         Part(name, size, errors[name], velocity if name == STRIBECK else 0.0)
@@ -65,4 +91,4 @@ def _errors(model: ReconstructedModel, j: int) -> dict[str, float]:
         for key in ("coulomb", "viscous", "static")
     }
     of_rise = float(np.hypot(error["static"], error["coulomb"]))
-    return {COULOMB: error["coulomb"], VISCOUS: error["viscous"], STRIBECK: of_rise}
+    return {COULOMB: error["coulomb"], VISCOUS: error["viscous"], STRIBECK: of_rise, DRAG: 0.0, BY_LOAD: 0.0}

@@ -10,11 +10,12 @@ from armloop.diagnosis.verdict import Diagnosis
 from armloop.laws.effects.base import number
 from armloop.model import AddedEffect, ReconstructedModel
 
-#: Of effects the parameter that adds to a part of Eq. (34), and what that is called.
+#: Of effects the parameters that add to a part of Eq. (34), which part, and what that is called.
 _PARTS = {
-    "coulomb_friction": ("level", "dry friction"),
-    "viscous_friction": ("coefficient", "viscous friction"),
-    "stribeck_friction": ("static_excess", "the rise of friction at low speed"),
+    "coulomb_friction": (("level",), "coulomb", "dry friction"),
+    "presliding_hysteresis": (("level", "level_change"), "coulomb", "dry friction"),
+    "viscous_friction": (("coefficient",), "viscous", "viscous friction"),
+    "stribeck_friction": (("static_excess",), "stribeck", "the rise of friction at low speed"),
 }
 
 
@@ -46,10 +47,21 @@ def of_growth(
         assert joint is not None
         has = _parts(model, joint - 1)
         for a in model.effects:
-            if a.effect.joint == joint and a.effect.name in has:
-                has[a.effect.name] += _size(a)
-        own = [a for a in added if a.effect.joint == joint and has.get(a.effect.name, 0.0) > 0]
-        parts = [f"{_PARTS[a.effect.name][1]} is {1 + _size(a) / has[a.effect.name]:.3g} times" for a in own]
+            if (
+                a.effect.joint == joint
+                and a.effect.name in _PARTS
+                and (part := _PARTS[a.effect.name][1]) in has
+            ):
+                has[part] += _size(a)
+        more = dict.fromkeys((_PARTS[a.effect.name][1:] for a in added if a.effect.name in _PARTS), 0.0)
+        for a in added:
+            if a.effect.joint == joint and a.effect.name in _PARTS:
+                more[_PARTS[a.effect.name][1:]] += _size(a)
+        parts = [
+            f"{words} is {1 + size / has[part]:.3g} times"
+            for (part, words), size in more.items()
+            if size and has.get(part, 0.0) > 0
+        ]
         if parts:
             found.append(f"joint {joint}: {', '.join(parts)} what the model has")
     return found
@@ -57,15 +69,15 @@ def of_growth(
 
 def _size(added: AddedEffect) -> float:
     """What an effect adds to its part of Eq. (34)."""
-    return number(added.parameters[_PARTS[added.effect.name][0]].value)
+    names = _PARTS[added.effect.name][0]
+    return sum(number(added.parameters[name].value) for name in names if name in added.parameters)
 
 
 def _parts(model: ReconstructedModel, j: int) -> dict[str, float]:
-    """By effects the size of what a joint (0-based) has of each, by its Stribeck law or the nearest straight line."""
+    """By its parts the size of what a joint (0-based) has of each, by its Stribeck law or the nearest straight line."""
     laws, lines = (model.uncertainty.get(key) or [] for key in ("stribeck", "friction_line"))
     law: Mapping[str, Any] = next((each[j] for each in (laws, lines) if j < len(each) and each[j]), {})
     has = {key: float(law[key]["value"]) for key in ("coulomb", "viscous", "static") if key in law}
-    found = {f"{key}_friction": has[key] for key in ("coulomb", "viscous") if key in has}
     if {"static", "coulomb"} <= set(has):
-        found["stribeck_friction"] = has["static"] - has["coulomb"]
-    return found
+        has["stribeck"] = has["static"] - has["coulomb"]
+    return has

@@ -18,9 +18,9 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
-from armloop.diagnosis.standstill import at_rest, fastest, sticking
 from armloop.dynamics import Dynamics, ModelEquations
 from armloop.identification.scoring import too_slow
+from armloop.identification.standstill import at_rest, fastest, sticking
 from armloop.laws.friction import Direction
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import PER_MEDIAN, Array, Mask

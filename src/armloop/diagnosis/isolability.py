@@ -11,8 +11,8 @@ from armloop.data.blocks import widened
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.standstill import STILL
 from armloop.experiment.excitation import Reference
+from armloop.identification.standstill import STILL
 from armloop.laws.effects import Context, Effect
 from armloop.model import AddedEffect
 from armloop.util.arrays import Array, Mask

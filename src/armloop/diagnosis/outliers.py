@@ -13,7 +13,7 @@ from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import dry_level
 from armloop.diagnosis.pushes import PAUSE, around
-from armloop.diagnosis.standstill import sticking
+from armloop.identification.standstill import sticking
 from armloop.util.arrays import Array
 
 #: Over this many seconds the residual is averaged; shorter bursts are none, as those closer than PAUSE are one.

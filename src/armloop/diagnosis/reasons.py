@@ -19,7 +19,6 @@ from armloop.diagnosis.evidence import (
     sliding,
 )
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE
-from armloop.diagnosis.standstill import creep, mixed_in, sticking
 from armloop.features.lagrangian import constant_weights
 from armloop.identification.goodness import (
     WORTH_A_WORD,
@@ -27,10 +26,12 @@ from armloop.identification.goodness import (
     merged,
     outside_trained_range,
     parts_of,
+    trained_range,
     witness,
 )
 from armloop.identification.scoring import known_from, too_slow
 from armloop.identification.shared_motors import sharing
+from armloop.identification.standstill import creep, mixed_in, sticking
 from armloop.identification.uncertainty import usual_in_words
 from armloop.laws.effects import Effect
 from armloop.laws.effects.base import number
@@ -90,15 +91,15 @@ def standing(
         found: whether anything was.
     """
     samples, model = evidence.samples, evidence.model
-    left = evidence.left_by(augmented)
+    left, bare = evidence.left_by(augmented), evidence.left_by(model)
     parts = parts_of(witness(left, samples, evidence.context.load))
-    outside = outside_trained_range(samples.motion, model.history.get("range"))
-    strays, creeps = far_outside(samples.motion, model.history.get("range")), too_slow(model, samples)
+    outside = outside_trained_range(samples.motion, trained := trained_range(model))
+    strays, creeps = far_outside(samples.motion, trained), too_slow(model, samples)
     far = strays.mean(axis=0)
     slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
     slides = sliding(samples, model)
     rows = slides & ~strays & ~creeps
-    few = seldom(model, samples, rows & ~mixed_in(model, samples, evidence.scale, rows))
+    few = seldom(model, samples, rows & ~mixed_in(model, samples, bare, evidence.scale, rows))
     reasons = [*_outside(outside, far), *_slow(model, samples, slow)]
     unknown, unexplained, judged, rough = False, [], 0, []
     multiples: list[bool | None] = []

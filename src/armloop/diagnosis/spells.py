@@ -26,9 +26,9 @@ from armloop.diagnosis.judgement import MOSTLY, much_is_left
 from armloop.diagnosis.onset import log_name, posterior
 from armloop.diagnosis.outcomes import Found
 from armloop.diagnosis.search import ROUNDS
-from armloop.diagnosis.standstill import near_standstill
 from armloop.diagnosis.trials import Known
 from armloop.diagnosis.two_states import intervals_of, likeliest, two_states, worth
+from armloop.identification.standstill import near_standstill
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.coulomb_friction import CoulombFriction
 from armloop.laws.effects.spells import Interval, Spells

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from synthetic import fourier_motion, three_axis
 
 from armloop.data.motion import Motion
-from armloop.identification.goodness import extrapolated, outside_trained_range
+from armloop.identification.goodness import extrapolated, outside_trained_range, trained_range
+from armloop.laws.effects import Estimate, effect
+from armloop.laws.friction import FrictionLaw
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters
 
 
 def inside(motion: Motion) -> list[np.ndarray]:
@@ -46,3 +55,28 @@ def test_what_is_extrapolated_is_told_by_what_leaves_its_range_most_often() -> N
     rare = motion.v.copy()
     rare[::100, 0] *= 9.0
     assert extrapolated(arm, Motion(motion.time, motion.q, rare, motion.vdot, motion.starts), trained) == []
+
+
+def of_links(arm: Arm, **kept: Any) -> ReconstructedModel:
+    body = RigidBody(nominal_parameters(arm), (), np.zeros(0))
+    return ReconstructedModel(arm, (body,), FrictionLaw(((),) * arm.n), **kept)
+
+
+def test_where_nothing_depends_on_a_first_angle_it_is_trained_everywhere() -> None:
+    arm, motion = three_axis(), fourier_motion(10, 50, 0)
+    history = {"range": [np.asarray(x).tolist() for x in inside(motion)]}
+    kept = np.array(history["range"])
+    found = trained_range(of_links(arm, history=history))
+    assert found is not None and found[0, 0] == np.inf
+    np.testing.assert_array_equal(np.delete(found.ravel(), 0), np.delete(kept.ravel(), 0))
+    away = replace(motion, q=motion.q + np.array([9.0, 0.0, 0.0]))
+    assert outside_trained_range(away, found).max() == 0 < outside_trained_range(away, kept)[0]
+    # but where the arm leans, or something else knows the angle
+    leans = replace(arm, gravity=arm.gravity + np.array([0.05, 0.0, 0.0]))
+    np.testing.assert_array_equal(trained_range(of_links(leans, history=history)), kept)
+    parameters = {"amplitude": 1.0, "order": 3.0, "phase": 0.0}
+    rippled = AddedEffect(
+        effect("torque_ripple", 1), {key: Estimate(x, 0.0, "") for key, x in parameters.items()}
+    )
+    np.testing.assert_array_equal(trained_range(of_links(arm, history=history, effects=(rippled,))), kept)
+    assert trained_range(of_links(arm)) is None

@@ -4,7 +4,12 @@ Only motions, torques and residuals come in, so that a reconstruction and the di
 measure.
 """
 
-from armloop.identification.goodness.extrapolation import WORTH_A_WORD, extrapolated, outside_trained_range
+from armloop.identification.goodness.extrapolation import (
+    WORTH_A_WORD,
+    extrapolated,
+    outside_trained_range,
+    trained_range,
+)
 from armloop.identification.goodness.parts import Parts, merged, parts_of, unjudged
 from armloop.identification.goodness.witness import Witness, witness
 
@@ -16,6 +21,7 @@ __all__ = [
     "merged",
     "outside_trained_range",
     "parts_of",
+    "trained_range",
     "unjudged",
     "witness",
 ]

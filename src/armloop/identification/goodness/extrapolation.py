@@ -2,18 +2,45 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from armloop.data.motion import Motion
+from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Mask
 
 #: How far beyond its range, in parts of it, a quantity still counts as inside: ranges leave out the rarest samples.
 _MARGIN = 0.05
+#: Torques that change by less than this part do not depend on what was changed, but for rounding and a base that is level to
+#: a ten-thousandth.
+_NOTHING = 1e-4
 #: Part of a motion that is worth a word.
 WORTH_A_WORD = 0.02
+
+
+def trained_range(model: ReconstructedModel) -> Array | None:
+    """(4, n) half ranges of q, v and vdot and the centre of q of what a model was fitted on; None where it keeps none.
+
+    Where nothing of the arm depends on the angle of its first joint, as about a vertical axis, or on the place of its first
+    slide, the range of that is infinite: as good as trained everywhere.
+    """
+    kept = model.history.get("range")
+    if kept is None:
+        return None
+    ranges = np.array(kept, dtype=float)
+    half, speed, rate, centre = ranges
+    rng, N = np.random.default_rng(0), 64
+    q, v, vdot = rng.uniform(-1, 1, (3, N, len(half))) * np.stack([half, speed, rate])[:, None]
+    motion = Motion(np.arange(float(N)), centre + q, v, vdot, np.arange(N))
+    turned = motion.q.copy()
+    turned[:, 0] += rng.uniform(-1, 1, N) * np.maximum(half[0], 1.0)
+    here, there = (model.predict(replace(motion, q=q)) for q in (motion.q, turned))
+    if np.abs(here - there).max() <= _NOTHING * np.abs(here).max():
+        ranges[0, 0] = np.inf
+    return ranges
 
 
 def outside_trained_range(motion: Motion, ranges: Any) -> Array:

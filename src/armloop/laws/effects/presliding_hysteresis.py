@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.laws.effects.base import Context, Parameter
+from armloop.laws.effects.base import Context, Estimate, Parameter, number
 from armloop.laws.effects.law import Law
 
 
@@ -27,6 +27,14 @@ class PreslidingHysteresis(Law):
     law = "f z/w with dz = dq, |z| <= w"
     elements = ("hysteresis", "sign")
     nested = 1  # a level of sign(v) by itself is dry friction
+
+    def sentence(self, parameters: dict[str, Estimate]) -> str:
+        said, change = super().sentence(parameters), parameters.get("level_change")
+        if change is None or not number(change.value):
+            return said
+        sliding = number(parameters["level"].value) + number(change.value)
+        unit = change.unit
+        return f"{said}, and {change.words()} of it at once: {sliding:.3g} {unit} more dry friction once it slides"
 
     def shapes(self, context: Context) -> Sequence[float]:
         travel = float(np.ptp(context.motion.q[:, self.index]))

@@ -13,7 +13,6 @@ from armloop.data.blocks import widened
 from armloop.data.creep import may_stick
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
-from armloop.identification.scoring import residual
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Mask
 
@@ -56,16 +55,17 @@ def near_standstill(samples: Samples) -> Mask:
     return widened(~samples.moving, samples.motion, round(samples.reach / samples.period))
 
 
-def mixed_in(model: ReconstructedModel, samples: Samples, scale: Array, rows: Mask) -> Mask:
+def mixed_in(model: ReconstructedModel, samples: Samples, left: Array, scale: Array, rows: Mask) -> Mask:
     """(N, n) samples in which the filter may have left more of what a joint held at rest than a part of the baseline.
 
     Of a joint that hardly goes anywhere without resting again there are none: all that it does is like that.
 
     Args:
+        left: (N, n) what the model leaves, N·m (N).
         scale: (n,) baseline, N·m (N).
         rows: (N, n) samples that count beside that.
     """
-    held = np.where(at_rest(samples, model), residual(model, samples), 0.0)
+    held = np.where(at_rest(samples, model), left, 0.0)
     mixed = np.asarray(np.abs(smooth(samples, held)) > _MIXED * scale)
     most = (mixed & rows).sum(axis=0) > _MOST * rows.sum(axis=0)
     return np.asarray(mixed & ~most)
