@@ -72,6 +72,7 @@ class Answers:
             "fit": lambda *_: "nothing",
             "known_contacts": lambda evidence: np.array([self.given["known"], False]),
             "standing": self.standing,
+            "_multiples": lambda found: [],
             "Hypotheses": lambda evidence, jobs: nullcontext((evidence.name, jobs)),
             "best_account": self.best,
             "judge_reversals": self.reversals,

@@ -34,7 +34,10 @@ def test_a_run_that_rests_is_judged_by_its_events_alone(
     assert found.verdict == verdict and found.unlisted is None and found.contacts == contacts
     # of no joint is it known what it lacks
     model = ("with", *(["push"] if contacts else []))
-    assert answers.asked["standing"] == ("left", model, ("errors", False), [1, 2, 3]) and found.model == model
+    name, augmented, left, joints = answers.asked["standing"]
+    assert (name, augmented, joints) == ("left", model, [1, 2, 3]) and found.model == model
+    # nothing was looked for, and of what is left nothing is said but how much it is
+    assert np.isnan(left).all()
     assert found.reasons == ["still", "stands", "zeros of ['run']"] and found.zeros.tolist() == [[0.1] * 3]
     assert answers.asked["contacts"] == "residual of whole" and "best" not in answers.asked
     assert found.outcome.before == found.outcome.after and found.evidence.name == "left"

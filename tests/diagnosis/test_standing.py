@@ -110,6 +110,16 @@ def test_a_short_run_cannot_tell_and_says_why(model: ReconstructedModel) -> None
     answer = diagnose(model, [run(10, 5.0)]).to_dict()
     assert answer["verdict"] == "cannot_tell"
     assert any("too little motion to judge" in words for words in answer["reasons"])
+    assert not any("multiple of the baseline" in words for words in answer["reasons"])
+
+
+def test_what_a_short_run_leaves_is_not_what_nothing_accounts_for(model: ReconstructedModel) -> None:
+    log = run(10, 5.0)
+    more = replace(log, tau=log.tau + [0.0, 2.0, 0.0] * np.sin(log.q))
+    answer = diagnose(model, [more]).to_dict()
+    assert answer["verdict"] == "cannot_tell"
+    assert any("multiple of the baseline" in words and "(joint 2)" in words for words in answer["reasons"])
+    assert not any("accounts for" in words or "play in" in words for words in answer["reasons"])
 
 
 def test_a_short_run_still_shows_its_event(model: ReconstructedModel) -> None:

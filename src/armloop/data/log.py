@@ -351,6 +351,8 @@ def _side_by_side(columns: dict[str, Array], kinds: Mapping[str, list[str]]) -> 
 
 
 def _check_shapes(time: Array, q: Array, name: str) -> None:
+    if time.size == 0:
+        raise LogError(f"{name}: there are no samples; a log has one row per instant")
     if time.ndim != 1 or q.ndim != 2 or len(q) != len(time):
         raise LogError(f"{name}: time must be (N,) and q (N, n); they are {time.shape} and {q.shape}")
 

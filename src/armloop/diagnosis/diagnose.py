@@ -21,7 +21,7 @@ from armloop.diagnosis.fit import fit
 from armloop.diagnosis.friction_of_the_day import of_no_other_day, of_that_day, of_the_day, says_more
 from armloop.diagnosis.growth import with_growth
 from armloop.diagnosis.homogeneity import are_unlike, as_modelled, is_contradicted, leaves_much, names_of
-from armloop.diagnosis.judgement import CHANCE
+from armloop.diagnosis.judgement import CHANCE, MULTIPLE
 from armloop.diagnosis.onset import account_with_onsets
 from armloop.diagnosis.outcomes import (
     Outcome,
@@ -220,9 +220,22 @@ def _by_events_alone(whole: Evidence, contacts: list[Contact], untold: list[Cont
         contacts,
         evidence.rows,
     )
-    stand = standing(evidence, augmented, found.errors()["after"], range(1, whole.model.arm.n + 1))
+    n = whole.model.arm.n
+    # nothing was looked for: what is left is not what nothing accounts for
+    stand = standing(evidence, augmented, [np.nan] * n, range(1, n + 1))
     doubted = [event_untold(contact.added) for contact in untold]
-    return replace(found, standing=replace(stand, reasons=[*doubted, too_still(evidence), *stand.reasons]))
+    reasons = [*doubted, too_still(evidence), *_multiples(found), *stand.reasons]
+    return replace(found, standing=replace(stand, reasons=reasons))
+
+
+def _multiples(found: Diagnosis) -> list[str]:
+    """A sentence on joints whose residual is a multiple of the baseline, in a run too short to look for its cause."""
+    times = np.asarray(found.errors()["after"], dtype=float) / found.evidence.scale
+    much = [f"{x:.2g} times (joint {j + 1})" for j, x in enumerate(times) if x >= MULTIPLE]
+    said = (
+        f"the residual is a multiple of the baseline, {', '.join(much)}: a run that long would tell its cause"
+    )
+    return [said] if much else []
 
 
 def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnosis:
