@@ -160,12 +160,28 @@ def test_a_model_of_currents_says_at_once_what_it_is_no_use_for():
     assert said[0] == [] and len(said[1]) == 1 and "diagnose" in said[1][0]
 
 
+def test_a_diagnosis_has_the_laws_of_no_catalogue(model):
+    log = run(40, 6)
+    more = 1.5 * np.cos(2 * log.q[:, 0]) * log.v[:, 1]
+    seen = MotionLog(log.time, log.q, log.v, log.tau + np.outer(more, [0.0, 1.0, 0.0]), name="seen")
+    found = al.diagnose(model, seen)
+    assert found.verdict == "unlisted_effect" and not found.effects and not found.model.effects
+    (law,) = found.laws
+    assert law.effect.joint == 2 and law.parameters["cos(2*q1)*v2"].value == pytest.approx(1.5, abs=0.1)
+    assert "a law of joint 2" in repr(found) and repr(law).startswith("<unlisted at joint 2: ")
+    adopted = al.diagnose(model, seen, adopt=True)
+    assert [one.effect.place for one in adopted.effects] == [law.effect.place]
+
+
 def test_a_diagnosis_has_objects_for_effects(model, found, tmp_path):
     assert found.verdict == "effects_found"
     (added,) = found.effects
     assert (added.effect.name, added.effect.joint) == ("viscous_friction", 2)
     assert added.parameters["coefficient"].value == pytest.approx(0.8, abs=0.08)
-    assert found.error["after"][1] < 0.5 * found.error["before"][1]
+    assert found.error["after"][1] < 0.5 * found.error["before"][1] and found.laws == []
+    assert repr(added).startswith("<viscous_friction at joint 2: coefficient 0.") and "at 0x" not in repr(
+        added
+    )
     assert isinstance(found.model, al.Model) and len(found.model.effects) == 1
     assert ", 1 effect added" in repr(found.model)
     assert found.model.score(run(20, 5, 0.8)).rmse[1] < model.score(run(20, 5, 0.8)).rmse[1]

@@ -37,8 +37,9 @@ class Diagnosis:
         verdict: "no_effect", "effects_found", "unlisted_effect" or "cannot_tell".
         effects: what was found, each with ``.effect`` (its ``name``, ``joint``), ``.parameters`` (by name: ``value``,
             ``std_error``, ``unit``) and ``.torque(context)``.
+        laws: laws that are in no catalogue, as effects are; the model has them if they were adopted.
         model: the model with the effects found.
-        error: RMSE per joint on data not fitted: ``before``, ``after``, ``noise_floor``.
+        error: RMSE per joint on data not fitted: ``before``, ``after``, ``noise_floor``; NaN for a joint that did not move.
         before: the model that was diagnosed.
         logs: names of the logs that this is said of; of others, in which the arm was not the same, ``apart`` has diagnoses.
     """
@@ -49,6 +50,7 @@ class Diagnosis:
         self.verdict: str = found.verdict
         self.model = Model.of(found.model)
         self.effects: list[AddedEffect] = list(found.model.effects[len(before.effects) :])
+        self.laws: list[AddedEffect] = [each for law in found.laws for each in law.added()]
         self.error: dict[str, Any] = found.errors()
         self.logs = list(found.logs)
 
@@ -86,7 +88,7 @@ class Diagnosis:
         return displayed(residual_time_figure(self._found))
 
     def __repr__(self) -> str:
-        found = ", ".join(added.effect.label() for added in self.effects)
+        found = ", ".join(self._found.labels)
         return f"<armloop.Diagnosis {self.verdict}{': ' + found if found else ''}>"
 
     def __str__(self) -> str:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from armloop.laws.effects import Context, Effect, Estimate, Value, effect
 from armloop.laws.effects.base import Placed, Pointwise, entry
 from armloop.laws.effects.onset import Onset
@@ -25,6 +27,12 @@ class AddedEffect:
     effect: Effect
     parameters: dict[str, Estimate]
     when: str | None = None
+
+    def __repr__(self) -> str:
+        values = ", ".join(
+            f"{key} {e.words()}" for key, e in self.parameters.items() if np.ndim(e.value) == 0
+        )
+        return f"<{self.effect.label()}{': ' + values if values else ''}>"
 
     def torque(self, context: Context) -> Array:
         """(N, n) torque of the effect."""

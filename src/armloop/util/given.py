@@ -14,6 +14,8 @@ from armloop.util.errors import InputError, one_line
 if TYPE_CHECKING:
     from armloop.util.arrays import Array
 
+#: Drake's scalar types beside float.
+_OF_DRAKE = {"AutoDiffXd", "Expression", "Variable"}
 #: Characters of a value that a message shows.
 _SHOWN = 60
 
@@ -100,4 +102,6 @@ def shown(value: Any) -> str:
         text += f" and shape {shape}"
         if kind == "f" and not isfinite(value.sum()):
             text += ", with a number that is not finite"
+        if kind == "O" and (elements := {type(x).__name__ for x in value.flat} & _OF_DRAKE):
+            text += f", of {elements.pop()}s, for which there is armloop.drake.model_equations(model, T)"
     return text
