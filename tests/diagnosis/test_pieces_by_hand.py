@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -251,8 +251,8 @@ class TestWhatIsKnownOfARun:
         samples: Any = SimpleNamespace(
             moving=moving, reach=reach, period=0.1, cutoff_hz=cutoff, motion=motion(30, 3)
         )
-        model = SimpleNamespace(history={}, arm=SimpleNamespace(n=3))
-        found = innovations.at_rest(cast(Any, SimpleNamespace(samples=samples, model=model)))
+        model: Any = SimpleNamespace(history={}, arm=SimpleNamespace(n=3))
+        found = innovations.at_rest(samples, model)
         assert np.flatnonzero(found[:, 1]).tolist() == list(range(10 + smeared, 20 - smeared))
         # to the end of the run it rests
         assert np.flatnonzero(found[:, 0]).tolist() == list(range(25 + smeared, 30)) and not found[:, 2].any()
@@ -280,6 +280,7 @@ class TestWhatIsKnownOfARun:
         given = motion(40, 3)
         monkeypatch.setattr(evidence, "_sliding", lambda samples, model: np.ones((40, 3), dtype=bool))
         monkeypatch.setattr(evidence, "independent_rows", lambda samples: np.ones(40, dtype=bool))
+        monkeypatch.setattr(evidence, "residual", lambda model, samples: np.zeros((40, 3)))
         model: Any = SimpleNamespace(baseline={}, history={}, uncertainty={}, effects=(), arm=an_arm())
         model.context = lambda motion, effects: Context(an_arm(), motion, period=0.25)
         tau = np.zeros((40, 3))
