@@ -42,7 +42,7 @@ class TestWhole:
         monkeypatch.setattr(torque_checks, "placed_runs", lambda logs: list(enumerate(logs)))
         monkeypatch.setattr(torque_checks, "is_time_series", lambda q, runs: q)
         monkeypatch.setattr(
-            torque_checks, "meant", lambda *given: (asked.get("meant", {}).get(given[3], ""), None)
+            torque_checks, "meant", lambda *given: (asked.get("meant", {}).get(given[1], ""), None)
         )
         monkeypatch.setattr(torque_checks, "together", lambda *_: [])
         monkeypatch.setattr(torque_checks, "times_lighter", lambda *_: asked.get("lighter", 0.0))
@@ -115,9 +115,9 @@ def test_what_is_wrong_is_asked_once_more_of_the_arm_as_it_stands(
     found: Any = [SimpleNamespace(of=lambda of: "off" if of is arm else None)] if slight else []
     monkeypatch.setattr(torque_checks, "together", lambda problem, plain: found)
     said = {"plain": ("they are exchanged", None), "as it stands": (still, None)}
-    monkeypatch.setattr(torque_checks, "meant", lambda of, logs, cutoff_hz, left: said[left])
+    monkeypatch.setattr(torque_checks, "meant", lambda of, left: said[left])
     plain: Any = "plain"
-    assert torque_checks._otherwise(problem, [], 8.0, plain) == (
+    assert torque_checks._otherwise(problem, plain) == (
         still if slight else "they are exchanged",
         found,
     )
