@@ -15,7 +15,7 @@ from armloop.reports.html import Card, Report, Section, prose, render, tied, wid
 from armloop.reports.loop_report import loop_report
 from armloop.reports.loop_stages import loop_figure
 from armloop.reports.tables import make_table
-from armloop.reports.words import number
+from armloop.reports.words import number, with_error
 
 # written without an end tag
 _VOID = {"meta", "link", "br", "img"}
@@ -83,7 +83,7 @@ def test_the_loops_numbers_are_the_results(page: str, loop: SimpleNamespace) -> 
     for eta in loop.tracking_after.eta:
         assert f">{number(float(eta))}</td>" in page
     stiffness = loop.diagnosis.outcome.added()[0].parameters["stiffness"]
-    assert f"{stiffness.value:.4g}" in page
+    assert with_error(stiffness.value, stiffness.std_error) in page.replace("\xa0", " ")
     assert "&lt;angle&gt;" in page
 
 
