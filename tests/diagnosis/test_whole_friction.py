@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -24,11 +24,11 @@ from synthetic import (
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
-from armloop.diagnosis import Diagnosis, diagnose, trials
+from armloop.diagnosis import Diagnosis, diagnose, outcomes, trials
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked, Whitening
 from armloop.diagnosis.fit import Proportion, Shape, fit
 from armloop.diagnosis.friction_as_a_whole import friction_of
-from armloop.diagnosis.outcomes import Found, hypotheses_of, others_than
+from armloop.diagnosis.outcomes import Found, Outcome, hypotheses_of, others_than, without_effect
 from armloop.diagnosis.posterior import log_posterior
 from armloop.diagnosis.search import _Search
 from armloop.diagnosis.trials import Hypotheses, Known
@@ -376,6 +376,29 @@ def test_effects_in_proportion_have_one_free_parameter() -> None:
         assert fitted.clear[first] == pytest.approx(fitted.clear[last])
         assert fitted.clear[first] == pytest.approx(growth.value / growth.std_error)
         assert fitted.clear_together([first, last]) == pytest.approx(fitted.clear_together([first]))
+        # they are one number in that, too, where it is hardly clear
+        noise = y + 30.0 * np.random.default_rng(4).normal(size=60)
+        hardly = fit(evidence, noise, effects, [shapes[k] for k in order])
+        assert hardly.clear_together([first, last]) == pytest.approx(hardly.clear_together([first]))
+        assert hardly.clear_together([first]) < 5
+
+
+def test_friction_that_has_fallen_as_a_whole_is_no_set_that_can_be(model: ReconstructedModel) -> None:
+    """No arm has a Stribeck part below zero, and a change of one is not told from its absence."""
+    for more, told in ((MORE, 3), (-0.4, 0)):
+        evidence = Evidence.of(model, preprocess([run(11, more)], model.conditioning), hypotheses(model.arm))
+        search = _Search(evidence, lambda text: None, cast(Any, None), [])
+        assert len(search._in_proportion([], 2)) == told
+
+
+def test_an_effect_goes_with_those_that_it_is_in_proportion_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    tied = Shape.fixed(0.0, Proportion(2.0))
+    every = [Found(effect(name, 1), tied, 0.0) for name in LAWS[:2]]
+    every.append(Found(effect("payload", None), Shape.fixed(0.0), 0.0))
+    monkeypatch.setattr(outcomes, "known_with", lambda evidence, found: SimpleNamespace(fit=len(found)))
+    whole = Outcome(every, cast(Any, None), cast(Any, None))
+    assert [f.effect.name for f in without_effect(cast(Any, None), whole, every[1]).found] == ["payload"]
+    assert len(without_effect(cast(Any, None), whole, every[2]).found) == 2
 
 
 def test_what_is_in_proportion_goes_together() -> None:
