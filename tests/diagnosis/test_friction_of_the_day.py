@@ -102,7 +102,10 @@ def test_what_was_found_is_no_part_of_the_friction_that_is_taken_off(model: Reco
     levels = []
     for beside in ([], [known]):
         found = of_the_day(whole, beside)
-        assert found is not None
+        assert found is not None and found[0].whitening is not None
+        # which of the model's effects it is is known: it is no part of what a joint had
+        assert [found[0].whitening.are(a) for a in found[0].model.effects] == [True] * len(found[1])
+        assert not found[0].whitening.are(known)
         levels += [a.values["level"] for a in found[1] if a.effect.place == known.effect.place]
     assert 0.4 < levels[0] - levels[1] < 0.9  # robustly, and a part of it goes with the viscous coefficient
 
