@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -109,6 +110,14 @@ def test_it_reaches_as_far_as_it_is_large(held: float, nearest: float) -> None:
     if nearest:
         assert distance[there].max() == pytest.approx(nearest, abs=0.5 * nearest)
         assert not mixed[distance > 0.8].any()
+
+
+def test_without_a_filter_nothing_is_carried() -> None:
+    v = np.ones(800)
+    v[350:450] = 0.0
+    left = np.where(v == 0, 100.0, 0.0)[:, None]
+    samples = replace(samples_of(v, left[:, 0]), cutoff_hz=0.0)
+    assert not mixed_in(KNOWN, samples, left, np.array([0.1]), samples.moving).any()
 
 
 def test_of_a_joint_that_always_rests_again_all_counts() -> None:
