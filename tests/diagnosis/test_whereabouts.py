@@ -88,6 +88,35 @@ def test_energy_beyond_the_baselines_is_what_is_localised(
     assert whereabouts(evidence, fitted, 1).share == 0.0
 
 
+@pytest.mark.parametrize(
+    ("own", "other", "told"),
+    [
+        (0.9, 0.94, "joint 2"),
+        (0.9, 0.96, "joint 1"),
+        (0.7, 0.85, "joint 1"),
+        (0.95, 0.6, "joint 2"),
+        (0.6, 0.7, ""),
+    ],
+)
+def test_a_joints_own_condition_comes_before_one_of_another_that_is_hardly_better(
+    own: float, other: float, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 100 rows of joint 2 with the energy 1 each, above the baseline."""
+    number = np.arange(100)
+    conditions = [
+        ("joint 1 moves slower than 1", number < round(100 * other)),
+        ("joint 2 moves slower than 1", number >= 100 - round(100 * own)),
+    ]
+    monkeypatch.setattr(places, "_halves", lambda evidence, rows, joint: conditions)
+    monkeypatch.setattr(places, "_stretch", lambda *of: None)
+    samples = SimpleNamespace(motion=SimpleNamespace(time=np.arange(100.0)))
+    evidence: Any = SimpleNamespace(rows=np.ones((100, 2), dtype=bool), samples=samples)
+    stacked = SimpleNamespace(joint=np.ones(100), block=number)
+    fitted: Any = SimpleNamespace(held_out=np.full(100, np.sqrt(2.0)), stacked=stacked)
+    found = whereabouts(evidence, fitted, 1)
+    assert found.condition == (f"{told} moves slower than 1" if told else "")
+
+
 @pytest.mark.parametrize("blocks", [2, 5, 12])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_stretch_is_the_shortest_of_all_runs_of_blocks(seed: int, blocks: int) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from synthetic import fourier_motion, three_axis
 
-from armloop.data.motion import Motion
+from armloop.data.motion import Motion, Samples
+from armloop.diagnosis.evidence import Evidence
 from armloop.identification.goodness import extrapolated, outside_trained_range, trained_range
 from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionLaw
@@ -71,6 +72,9 @@ def test_where_nothing_depends_on_a_first_angle_it_is_trained_everywhere() -> No
     np.testing.assert_array_equal(np.delete(found.ravel(), 0), np.delete(kept.ravel(), 0))
     away = replace(motion, q=motion.q + np.array([9.0, 0.0, 0.0]))
     assert outside_trained_range(away, found).max() == 0 < outside_trained_range(away, kept)[0]
+    samples = Samples(away, np.zeros_like(away.q), np.ones(away.q.shape, dtype=bool), 0.02, 5.0)
+    evidence = Evidence.of(of_links(arm, history=history, baseline={"rmse": [1e3] * 3}), samples, [])
+    assert evidence.rows[:, 0].sum() > 20
     # but where the arm leans, or something else knows the angle
     leans = replace(arm, gravity=arm.gravity + np.array([0.05, 0.0, 0.0]))
     np.testing.assert_array_equal(trained_range(of_links(leans, history=history)), kept)
