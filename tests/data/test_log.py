@@ -392,3 +392,12 @@ def test_a_parquet_file_of_currents_says_so(tmp_path: Path) -> None:
     assert read_log(path, tau_unit="A", drive_gains=[2.0]).tau == pytest.approx(6.0 * q)
     write_log(path, read_log(path, tau_unit="A", drive_gains=[2.0]))
     assert read_log(path).tau_unit == "N*m"
+
+
+def test_a_log_of_no_samples_is_told() -> None:
+    nothing = np.zeros((0, 2))
+    for v in (None, nothing):
+        with pytest.raises(LogError, match="there are no samples"):
+            MotionLog.from_arrays([], nothing, nothing, v=v)
+    with pytest.raises(LogError, match="there are no samples"):
+        MotionLog.from_frame({"time": [], "q1": [], "tau1": []})
