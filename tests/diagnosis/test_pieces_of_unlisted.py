@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 from unittest.mock import Mock
 
 import numpy as np
@@ -12,7 +12,7 @@ from synthetic import three_axis
 
 from armloop.data.motion import Motion
 from armloop.diagnosis import unlisted
-from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.fit import Proportion, Shape
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead_of
 from armloop.diagnosis.posterior import LOG_ODDS
 from armloop.diagnosis.score import Score
@@ -363,3 +363,19 @@ class TestLawThatIsNotListed:
         assert words.startswith("joint 2 follows a law that is not listed: (2 ± 0.1) v2")
         words = unlisted.Unlisted(2, 1.5, 0.5, "", 1.5).to_dict()["words"]
         assert words.startswith("joint 2 follows no law") and "3 times the baseline" in words
+
+
+def test_effects_in_proportion_are_one_parameter_beside_a_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the place of two parameters a law may have two terms, in the place of one that both share but one."""
+    monkeypatch.setattr(unlisted, "_leaves_far_less", lambda law, other: True)
+    law = unlisted.Law([(1.0, "v2^3"), (1.0, "v1*v2")], np.ones(4), np.zeros(4, dtype=int))
+    for shape, simpler in ((OWN, True), (Shape.fixed(0.0, Proportion(2.0)), False)):
+        found = [
+            SimpleNamespace(effect=SimpleNamespace(complexity=1, joint=2), shape=shape) for _ in range(2)
+        ]
+        outcome: Any = SimpleNamespace(
+            found=found, after=SimpleNamespace(score=SimpleNamespace(of_joint=lambda j: None))
+        )
+        bare: Any = SimpleNamespace(found=[])
+        monkeypatch.setattr(unlisted, "_is_likelier", lambda *given: False)
+        assert unlisted._is_simpler(cast(Any, None), law, outcome, bare, 1) is simpler

@@ -290,6 +290,7 @@ EQUATION_34 = terms(("sign", 2.0, 0.0), ("viscous", 3.0, 0.0), ("stribeck_peak",
         (terms(("sign", 2.0, 0.0), ("offset", 9.0, 0.0)), [], [2.0]),
         (terms(("sign", 2.0, 0.0), ("cubic", 9.0, 0.0)), [], []),
         (EQUATION_34, [given("friction_asymmetry", level=1.0)], []),
+        (EQUATION_34, [given("presliding_hysteresis", level=1.0, width=0.01)], []),
         (EQUATION_34, [given("coulomb_friction", level=-2.5)], []),
         # an inertia rubs nowhere
         (EQUATION_34, [given("rotor_inertia", inertia=1.0)], [2.0, 3.0, 1.0]),
@@ -389,6 +390,25 @@ def test_friction_that_has_fallen_as_a_whole_is_no_set_that_can_be(model: Recons
         evidence = Evidence.of(model, preprocess([run(11, more)], model.conditioning), hypotheses(model.arm))
         search = _Search(evidence, lambda text: None, cast(Any, None), [])
         assert len(search._in_proportion([], 2)) == told
+
+
+def test_one_part_alone_is_not_asked_by_a_factor() -> None:
+    law, search = (
+        terms(("sign", 2.0, 0.0)),
+        SimpleNamespace(evidence=known_of(terms(("sign", 2.0, 0.0))), barred=[]),
+    )
+    assert len(friction_of(known_of(law), 0)) == 1 and _Search._in_proportion(cast(Any, search), [], 1) == []
+
+
+def test_what_goes_together_is_not_exchanged_in_parts() -> None:
+    """Two of a joint make way for two others, but not two of which neither is there without the other."""
+    asked: list[Any] = []
+    search: Any = SimpleNamespace(_two_for=lambda found, some, joints, value: asked.append(some) or [])
+    own, tied = Shape.fixed(0.0), Shape.fixed(0.0, Proportion(2.0))
+    for shape, pairs in ((own, 1), (tied, 0)):
+        asked.clear()
+        found = [Found(effect(name, 1), shape, 0.0) for name in LAWS[:2]]
+        assert list(_Search._exchanges(search, found, 0.0)) == [] and len(asked) == pairs
 
 
 def test_an_effect_goes_with_those_that_it_is_in_proportion_to(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Proportional growth of friction: all that a joint has of Eq. (34), of which a run shows one factor.
+"""Proportional growth of friction: all that a joint has, of which a run shows one factor.
 
 What wears, cools or lacks grease is the whole of a joint's friction more often than one term of it. One factor is known far
 better than the terms are, where few samples are slow.
@@ -6,6 +6,8 @@ better than the terms are, where few samples are slow.
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -16,19 +18,22 @@ from armloop.model import ReconstructedModel
 
 COULOMB, VISCOUS, STRIBECK = FRICTION = ("coulomb_friction", "viscous_friction", "stribeck_friction")
 DRAG, BY_LOAD = "quadratic_drag", "load_dependent_friction"
-#: Kinds of friction terms that are parts of an effect: a level while it slides, whatever comes before that; a fall; …
-_PARTS = {
-    "viscous": VISCOUS,
-    "viscous_forward": VISCOUS,
-    "viscous_backward": VISCOUS,
-    "stribeck_peak": STRIBECK,
-    "quadratic": DRAG,
-    "sign": COULOMB,
-    "smooth_sign": COULOMB,
-    "hysteresis": COULOMB,
-    "load_sign": BY_LOAD,
-    "load_smooth_sign": BY_LOAD,
-    "load_hysteresis": BY_LOAD,
+#: What a coefficient of each kind of friction term adds to the laws of a joint that slides: a direction that fades in, or
+#: remembers, is a level by then, and a rise from the static level is a level and so much less of a fall.
+_SHARES = {
+    "sign": {COULOMB: 1.0},
+    "smooth_sign": {COULOMB: 1.0},
+    "hysteresis": {COULOMB: 1.0},
+    "viscous": {VISCOUS: 1.0},
+    "viscous_forward": {VISCOUS: 1.0},
+    "viscous_backward": {VISCOUS: 1.0},
+    "stribeck_peak": {STRIBECK: 1.0},
+    "stribeck": {COULOMB: 1.0, STRIBECK: -1.0},
+    "quadratic": {DRAG: 1.0},
+    "load_sign": {BY_LOAD: 1.0},
+    "load_smooth_sign": {BY_LOAD: 1.0},
+    "load_hysteresis": {BY_LOAD: 1.0},
+    "offset": {},
 }
 
 
@@ -47,39 +52,33 @@ def friction_of(evidence: Evidence, j: int) -> list[Part]:
     Of falls at several velocities all are taken to be where the largest is. Effects that the model was given are parts of
     it, but not friction of the day, which is beside what has grown.
     """
-    model, whitening = evidence.model, evidence.whitening
-    has, falls = dict.fromkeys((*FRICTION, DRAG, BY_LOAD), 0.0), {0.0: 0.0}
-    for term in model.friction.terms[j]:
-        size = term.share * term.coefficient
-        if term.kind == "stribeck":  # a rise from a level that is the static one
-            has[COULOMB] += size
-        kind = STRIBECK if term.kind == "stribeck" else _PARTS.get(term.kind)
-        if kind is not None:
-            has[kind] += -size if term.kind == "stribeck" else size
-        elif term.element.part == "friction" and term.kind != "offset":
+    has, falls = defaultdict[str, float](float), defaultdict[float, float](float)
+    for law, size, velocity in _terms(evidence, j):
+        if law not in (*FRICTION, DRAG, BY_LOAD):
             return []
-        if kind == STRIBECK:
-            falls[term.parameter] = falls.get(term.parameter, 0.0) + abs(size)
+        has[law] += size
+        if law == STRIBECK:
+            falls[velocity] += abs(size)
+    if min(has.values(), default=0.0) < 0:
+        return []
+    errors, where = _errors(evidence.model, j), max(falls, key=falls.__getitem__, default=0.0)
+    laws = (name for name in (*FRICTION, DRAG, BY_LOAD) if has[name] > 0)
+    return [Part(name, has[name], errors.get(name, 0.0), where if name == STRIBECK else 0.0) for name in laws]
+
+
+def _terms(evidence: Evidence, j: int) -> Iterator[tuple[str, float, float]]:
+    """Law, coefficient and Stribeck velocity of every term of a joint's (0-based) friction, and of every effect there."""
+    model, whitening = evidence.model, evidence.whitening
+    for term in model.friction.terms[j]:
+        for law, part in _SHARES.get(term.kind, {term.kind: 1.0}).items():
+            yield law, part * term.share * term.coefficient, term.parameter
     for added in model.effects:
         effect = added.effect
         of_the_day = whitening is not None and whitening.are(added)
-        if not effect.rubs or effect.joint != j + 1 or of_the_day:
-            continue
-        if effect.name not in has:
-            return []
-        size = number(added.parameters[effect.parameters[0].name].value)
-        has[effect.name] += size
-        if effect.name == STRIBECK:
-            falls[number(added.parameters["velocity"].value)] = abs(size)
-    if min(has.values()) < 0:
-        return []
-    velocity = max(falls, key=falls.__getitem__)
-    errors = _errors(model, j)
-    return [
-        Part(name, size, errors[name], velocity if name == STRIBECK else 0.0)
-        for name, size in has.items()
-        if size > 0
-    ]
+        if effect.rubs and effect.joint == j + 1 and not of_the_day:
+            known = (each.name for each in effect.parameters if each.name in added.parameters)
+            first, *others = (number(added.parameters[name].value) for name in known)
+            yield effect.name, first, others[0] if others else 0.0
 
 
 def _errors(model: ReconstructedModel, j: int) -> dict[str, float]:
@@ -91,4 +90,4 @@ def _errors(model: ReconstructedModel, j: int) -> dict[str, float]:
         for key in ("coulomb", "viscous", "static")
     }
     of_rise = float(np.hypot(error["static"], error["coulomb"]))
-    return {COULOMB: error["coulomb"], VISCOUS: error["viscous"], STRIBECK: of_rise, DRAG: 0.0, BY_LOAD: 0.0}
+    return {COULOMB: error["coulomb"], VISCOUS: error["viscous"], STRIBECK: of_rise}

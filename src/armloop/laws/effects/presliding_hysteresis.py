@@ -34,7 +34,7 @@ class PreslidingHysteresis(Law):
             return said
         sliding = number(parameters["level"].value) + number(change.value)
         unit = change.unit
-        return f"{said}, and {change.words()} of it at once: {sliding:.3g} {unit} more dry friction once it slides"
+        return f"{said}, beside {change.words()} of sign(v): {sliding:.3g} {unit} more dry friction once it slides"
 
     def shapes(self, context: Context) -> Sequence[float]:
         travel = float(np.ptp(context.motion.q[:, self.index]))
