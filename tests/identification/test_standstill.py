@@ -17,7 +17,6 @@ from armloop.data.signals import preprocess, smooth
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.evidence import Evidence
 from armloop.identification.reconstruction import Options, reconstruct
-from armloop.identification.reconstruction import tally as tallies
 from armloop.identification.standstill import at_rest, mixed_in
 from armloop.laws.effects import hypotheses
 from armloop.model import ReconstructedModel
@@ -125,24 +124,3 @@ def test_of_a_joint_that_always_rests_again_all_counts() -> None:
     left = np.where(v == 0, 1000.0, 0.0)[:, None]
     samples = samples_of(v, left[:, 0])
     assert not mixed_in(KNOWN, samples, left, np.array([0.1]), samples.moving).any()
-
-
-def test_a_baseline_is_of_what_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Noise of 0.1 beside what the filter has left of rests that held 100 times that."""
-    rng = np.random.default_rng(5)
-    v = np.ones(4000)
-    for first in range(300, 4000, 600):
-        v[first : first + 60] = 0.0
-    held = np.where(v == 0, 10.0, 0.0)[:, None]
-    samples = samples_of(v, held[:, 0])
-    noise = 0.1 * rng.normal(size=(4000, 1))
-    monkeypatch.setattr(tallies, "residual", lambda model, samples: smooth(samples, held) + noise)
-    chunk: Any = SimpleNamespace(
-        samples=samples, judging=lambda part, margin: np.ones(4000, dtype=bool), blocks=np.arange(4000) // 100
-    )
-    baseline = tallies.Tally.of(chunk, KNOWN, None).baseline()
-    (rmse,), (worst,) = baseline["rmse"], baseline["worst"]
-    assert rmse == pytest.approx(0.1, rel=0.1) and worst == pytest.approx(0.11, rel=0.1)
-    # with it, it would be four times as much
-    left = np.abs(smooth(samples, held) + noise)[samples.moving]
-    assert np.sqrt(np.mean(left**2)) > 0.4

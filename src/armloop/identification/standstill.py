@@ -67,7 +67,7 @@ def mixed_in(model: ReconstructedModel, samples: Samples, left: Array, scale: Ar
     """
     if samples.cutoff_hz <= 0:
         return np.zeros(rows.shape, dtype=bool)
-    held = np.where(at_rest(samples, model) & ~samples.moving, left, 0.0)
+    held = np.where(at_rest(samples, model), left, 0.0)
     mixed = np.asarray(np.abs(smooth(samples, held)) > _MIXED * scale)
     most = (mixed & rows).sum(axis=0) > _MOST * rows.sum(axis=0)
     return np.asarray(mixed & ~most)

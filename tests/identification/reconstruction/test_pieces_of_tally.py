@@ -20,13 +20,6 @@ LEFT, TAU = RNG.normal(size=(2, N, 2))
 MOVING = RNG.random((N, 2)) < 0.6
 BLOCKS = 3 + np.arange(N) // 4
 CONDITION = np.arange(N) // 10
-
-
-@pytest.fixture(autouse=True)
-def nobody_rests(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tally, "mixed_in", lambda model, samples, left, scale, rows: np.zeros_like(rows))
-
-
 #: A model that does not tell its range.
 NOBODY: Any = SimpleNamespace(history={})
 

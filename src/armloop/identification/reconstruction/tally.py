@@ -23,10 +23,9 @@ from armloop.identification.scoring import (
     score_of_sums,
     too_slow,
 )
-from armloop.identification.standstill import mixed_in
 from armloop.model import ReconstructedModel
 from armloop.regression.moments import added
-from armloop.util.arrays import PER_MEDIAN, Array, Mask
+from armloop.util.arrays import Array, Mask
 
 #: Which held-out blocks judge: all of them, those that choose the library, or those that choose nothing at all.
 Part = Literal["all", "selection", "test"]
@@ -84,11 +83,9 @@ class Tally:
             seconds: length of the pieces that ``blocks`` are told apart by; the held-out blocks' own by default.
         """
         samples, held = chunk.samples, chunk.judging(part, margin)
-        left = residual(model, samples)
-        every = left**2
+        every = residual(model, samples) ** 2
         squares, moving = every[held], samples.moving[held]
-        slides = samples.moving & ~(too_slow(model, samples) | samples.at_an_end[:, None])
-        slid = (slides & ~mixed_in(model, samples, left, _typical(left, slides), slides))[held]
+        slid = moving & ~(too_slow(model, samples) | samples.at_an_end[:, None])[held]
         labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples)
         sums, sliding = {}, {}
         for label in np.unique(labels[held]):
@@ -171,14 +168,6 @@ class Tally:
             mean = errors[enough] / counts[enough]
             found.append(float(np.sqrt(np.quantile(mean, 0.9))) if many else None)
         return found
-
-
-def _typical(left: Array, rows: Mask) -> Array:
-    """(n,) standard deviation of what is left (N, n) in these rows (N, n), by its median, which no standstill reaches."""
-    sizes = np.where(rows, np.abs(left), np.nan)
-    known = rows.any(axis=0)
-    sizes[:, ~known] = 0.0
-    return np.asarray(PER_MEDIAN * np.nanmedian(sizes, axis=0)) if len(sizes) else np.zeros(left.shape[1])
 
 
 def _places(samples: Samples, model: ReconstructedModel) -> dict[str, Mask]:
